@@ -13,6 +13,8 @@ const [band, icon, word, verdict, brake, sound, absent, pairs, facts, log] =
   ["band", "icon", "word", "verdict", "brake", "sound", "absent", "pairs", "facts", "log"].map(part);
 const ICONS = { clear: "\u2713", warning: "\u26a0", undecided: "?", violation: "\u2716" };
 const start = root.querySelector(".replay-start").onclick;
+/** Data of a view without vehicles. */
+const empty = JSON.parse(root.querySelector("script").textContent);
 /** @type {string[]} */
 let names = [];
 let delta = 1, radius = 0.1;
@@ -37,6 +39,13 @@ const packed = numbers => {
   return btoa(text);
 };
 
+/**
+ * Returns x, y, z from the middle of the box [m] and 1 or 0 for each vehicle. @param {any[]} places
+ * @returns {number[]}
+ */
+const placed = places => places.flatMap(at =>
+  at ? [...[0, 1, 2].map(axis => at[axis] - (box?.[0][axis] ?? 0)), at[3] ? 1 : 0] : [0, 0, 0, 0]);
+
 /** Starts the view around the last positions, with the trails behind them. */
 const restart = () => {
   const there = past.at(-1)?.filter(at => at) ?? [];
@@ -47,45 +56,15 @@ const restart = () => {
   const middle = ends.map(([low, high]) => (low + high) / 2);
   const half = ends.map(([low, high]) => Math.max(high - low, 4 * delta, 1));
   box = [middle, half];
-  const count = names.length;
-  // Steps between instants are whole cells of at most 16 bits.
-  let most_m = 0;
-  for (let row = 1; row < past.length; row++)
-    for (let k = 0; k < count; k++)
-      for (let axis = 0; axis < 3; axis++) {
-        const [from, to] = [past[row - 1][k], past[row][k]];
-        if (from && to) most_m = Math.max(most_m, Math.abs(to[axis] - from[axis]));
-      }
-  const cell = Math.max(1e-3, most_m / 30000);
-  const starts = new Int32Array(3 * count), steps = new Int16Array(3 * count * INSTANTS);
-  const cells = new Int32Array(3 * count);
-  for (let k = 0; k < count; k++) {
-    // The trail begins behind the last instant without the vehicle.
-    let oldest = past.length;
-    while (oldest > 0 && past[oldest - 1][k]) oldest--;
-    for (let row = 0; row < INSTANTS; row++) {
-      const instant = past.length - INSTANTS + row, at = instant < oldest ? null : past[instant][k];
-      if (!at) steps[3 * (row * count + k)] = -32768;
-      for (let axis = 0; at && axis < 3; axis++) {
-        const next = Math.round((at[axis] - middle[axis]) / cell), place = 3 * k + axis;
-        if (instant === oldest) starts[place] = next; else steps[3 * (row * count + k) + axis] = next - cells[place];
-        cells[place] = next;
-      }
-    }
-  }
   const reach = Math.max(half[0], half[1]), square = 10 ** Math.round(Math.log10(reach / 5));
-  const lines = [], most = Math.ceil(reach / square) * square, low = Math.min(0, ends[2][0]) - middle[2];
-  for (let at = -most; at <= most + square / 2; at += square)
-    lines.push(at, -most, low, at, most, low, -most, at, low, most, at, low);
+  const most = Math.ceil(reach / square) * square, low = Math.min(0, ends[2][0]) - middle[2];
   const times = Float64Array.from({ length: INSTANTS }, (_, k) => (k + 1 - INSTANTS) * PERIOD_S);
+  const first = Float64Array.of(times[0]), nobody = Uint16Array.of(65535, 65535);
   root.querySelector("script").textContent = JSON.stringify({
-    vehicles: names, radius_m: names.map(() => radius), shell_m: [delta / 2, delta / 2, delta / 2],
-    times_s: packed(times), decimals: 1, holds: false, origin_m: middle, middle_m: middle, half_m: half, cell_m: cell,
-    rounding_m: cell, viewpoint: { azimuth_deg: -60, elevation_deg: 30, across: null }, square_m: square,
-    ground: packed(Float32Array.from(lines)), points: count, starts: packed(starts), steps: packed(steps), rotors: null,
-    turns: "", breaks: "", near_s: packed(Float64Array.of(times[0])), near_who: packed(Uint16Array.of(65535, 65535)),
-    nearest: [], verdicts: [], moments: [], things: [], links: "", tension: false, delta_m: delta, formations: [],
-    axis_m: 1, axes: null, reference: null,
+    ...empty, vehicles: names, radius_m: names.map(() => radius), shell_m: [delta / 2, delta / 2, delta / 2],
+    delta_m: delta, times_s: packed(times), points: names.length, starts: packed(new Int32Array(3 * names.length)),
+    places: past.map(placed), cell_m: 1, origin_m: middle, middle_m: middle, half_m: half, square_m: square,
+    ground: [[-most, -most, low], [most, most, low]], near_s: packed(first), near_who: packed(nobody),
   });
   start();
   // A live view has no other time to play or to choose.
@@ -209,10 +188,7 @@ const draw = frame => {
   const outside = places.some((/** @type {any} */ at) =>
     at && (!root.player || !box || [0, 1, 2].some(axis => Math.abs(at[axis] - box[0][axis]) > box[1][axis])));
   if (outside) restart();
-  drawn = places.flatMap((/** @type {any} */ at) => {
-    const from = box?.[0] ?? [0, 0, 0];
-    return at ? [at[0] - from[0], at[1] - from[1], at[2] - from[2], at[3] ? 1 : 0] : [0, 0, 0, 0];
-  });
+  drawn = placed(places);
   near = frame.near ?? [65535, 65535];
   if (isOld) doubt(behind_s); else {
     const { t_s, status, text, last_brake: by, nominal_violation: ahead } = frame.state;

@@ -25,24 +25,25 @@
  * @typedef {[number, boolean, string, number[], number | null]} Verdict
  */
 /**
- * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more.
- * @typedef {{vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: Packed, middle_m: number[],
+ * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more. A live view has `places` for its last
+ * instants in the form of `push`.
+ * @typedef {{limits: {named: number, trails: number[], drops: number, slots: number, links: number, colours: number},
+ *   vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: Packed, middle_m: number[],
  *   origin_m: number[], half_m: number[], cell_m: number,
  *   viewpoint: {azimuth_deg: number, elevation_deg: number, across: number | null},
  *   points: number, starts: Packed,
  *   steps: Packed, breaks: Packed, near_s: Packed, near_who: Packed, holds: boolean, nearest: [number, string][],
- *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: Packed, square_m: number,
+ *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: number[][], square_m: number,
  *   rotors: {at_m: number[][], radius_m: number} | null, turns: Packed, links: Packed, tension: boolean,
  *   delta_m: number, lights: boolean, formations: {from_s: number, slots: Packed}[], axis_m: number,
- *   axes: number | null, reference: number | null}} Data
+ *   axes: number | null, reference: number | null, places?: number[][]}} Data
  */
 /** @typedef {{vao: WebGLVertexArrayObject | null, count: number, buffer: WebGLBuffer | null}} Mesh */
 /** @typedef {{made: WebGLProgram, at: Object<string, WebGLUniformLocation>}} Program */
 
-// A step of ABSENT along x marks a point that is not there. TANGENT is that of half the camera's angle of view. At most
-// NAMED vehicles are all labelled, where there is room. RED is the largest number of red pieces of trails. The camera
-// fits at most SAMPLES positions.
-const ABSENT = -32768, TRAIL_PIECES = 24000, TANGENT = 0.36, NAMED = 24, RED = 40000, SAMPLES = 4000;
+// A step of ABSENT along x marks a point that is not there. TANGENT is that of half the camera's angle of view. RED is
+// the largest number of red pieces of trails. The camera fits at most SAMPLES positions.
+const ABSENT = -32768, TRAIL_PIECES = 24000, TANGENT = 0.36, RED = 40000, SAMPLES = 4000;
 const UPRIGHT = Math.PI / 2;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
 // Uniforms that are integers.
@@ -73,6 +74,13 @@ const rgba = (colour, alpha = 1) => [...colour.map(part => part / 255), alpha];
 const css = (/** @type {number[]} */ colour) => `rgb(${colour})`;
 /** @param {number} x @param {number} low @param {number} high */
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+/** @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+/**
+ * Returns the point at a share of the way from one point to another.
+ * @param {ArrayLike<number>} a @param {ArrayLike<number>} b @param {number} share
+ */
+const mix = (a, b, share) => [0, 1, 2].map(axis => a[axis] + (b[axis] - a[axis]) * share);
 /**
  * Counts the entries of a sorted list that are at most `value`.
  * @param {ArrayLike<number>} sorted @param {number} value
@@ -118,7 +126,7 @@ const shader = name => {
 /** Adds the player of a flight to a page. @param {HTMLElement} root @param {Data} data */
 const play = (root, data) => {
   const count = data.vehicles.length, half = data.half_m, reach = Math.hypot(...half);
-  const { radius_m: radius, moments } = data, least_m = Math.min(...radius);
+  const { radius_m: radius, moments, limits } = data, least_m = Math.min(...radius);
   const times = new Float64Array(bytes(data.times_s));
   const first = times[0], last = times[times.length - 1];
   const nearS = new Float64Array(bytes(data.near_s)), nearWho = new Uint16Array(bytes(data.near_who));
@@ -130,7 +138,7 @@ const play = (root, data) => {
     const breaks = new Uint16Array(bytes(data.breaks)), visit = new Float32Array(data.points).fill(1);
     for (let row = 0, step = 0, to = 0, broken = 0; row < times.length; row++) {
       for (let k = 0; k < data.points; k++, step += 3, to += 4) {
-        const there = steps[step] !== ABSENT, breaking = breaks[broken] === row && breaks[broken + 1] === k;
+        const there = steps[step] > ABSENT, breaking = breaks[broken] === row && breaks[broken + 1] === k;
         if (breaking) broken += 2;
         if (breaking || !there) visit[k]++;
         for (let axis = 0; axis < 3; axis++) {
@@ -142,6 +150,7 @@ const play = (root, data) => {
       path[to] = times[row] - first;
       to += 4;
     }
+    data.places?.forEach((at, k, all) => path.set(at, (times.length - all.length + k) * wide * 4));
   }
 
   // Attitudes as quaternions x, y, z, w, in a texture like that of positions.
@@ -186,7 +195,7 @@ const play = (root, data) => {
   // Real time unless the flight would then take more than 30 s.
   speeds.value = SPEEDS.find(x => (last - first) / x <= 30) ?? 64;
   // Trails of many vehicles would hide them.
-  const usual = count < 25 ? Infinity : count < 100 ? 5 : 1;
+  const usual = count <= limits.trails[0] ? Infinity : count <= limits.trails[1] ? 5 : 1;
   const span = last - first, tails = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].filter(x => x < span)
     .filter((x, k, all) => x === usual || k > all.length - 5);
   const tail = select("Length of trails", [["Infinity", "whole trails"],
@@ -221,7 +230,7 @@ const play = (root, data) => {
     make("i", { class: "replay-swatch", style: "background:" + background });
   // Layers that would hide the formation, or outshine lights, are off at first.
   const off = new Set(data.lights ? LAYERS.filter(name => name !== "caption")
-    : [...bytes(data.links).byteLength > 4 * 40 ? ["links"] : [], ...count > 60 ? ["slots"] : []]);
+    : [...bytes(data.links).byteLength > 4 * limits.links ? ["links"] : [], ...count > limits.slots ? ["slots"] : []]);
   const boxes = new Map(LAYERS.filter(name => shows[name]).map(name => {
     shows[name] = !off.has(name);
     const box = make("input", { type: "checkbox", ...shows[name] && { checked: "" } });
@@ -338,11 +347,11 @@ const play = (root, data) => {
   /** Directions and projections: perspective, top, front, side. @type {[number, number, boolean][]} */
   const VIEWS = [[from.azimuth_deg * UPRIGHT / 90, from.elevation_deg * UPRIGHT / 90, false],
     [-UPRIGHT, UPRIGHT, true], [-UPRIGHT, 0, true], [0, 0, true]];
+  const aspect = () => canvas.clientWidth / canvas.clientHeight || 1;
   /** Moves the camera along its direction and across until all positions of the vehicles fit into the picture. */
   const fit = () => {
     follow.value = "";
-    const { right, up, back } = axes(), wide = TANGENT * (canvas.clientWidth / canvas.clientHeight || 1) * 0.94;
-    const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    const { right, up, back } = axes(), wide = TANGENT * aspect() * 0.94;
     target = bounds.map(([low, high]) => (low + high) / 2);
     for (let turns = 0; turns < 4; turns++) {
       const seen = cloud.map(at => {
@@ -365,12 +374,12 @@ const play = (root, data) => {
   };
   /** Distance at which a camera that follows the swarm always shows all of it [m]. */
   const close = () => {
-    const { right, up } = axes(), room = TANGENT * (canvas.clientWidth / canvas.clientHeight || 1) * 0.94;
+    const { right, up } = axes(), room = TANGENT * aspect() * 0.94;
     let need = 0;
     for (let row = 0, by = Math.ceil(times.length * count / SAMPLES); row < times.length; row += by) {
       const there = [...radius.keys()].map(k => (row * wide + k) * 4).filter(at => path[at + 3]);
       for (const [axis, half] of /** @type {[number[], number][]} */ ([[right, room], [up, 0.84 * TANGENT]])) {
-        const at = there.map(k => path[k] * axis[0] + path[k + 1] * axis[1] + path[k + 2] * axis[2]);
+        const at = there.map(k => dot(path.subarray(k), axis));
         const mean = at.reduce((sum, x) => sum + x, 0) / at.length;
         for (const x of at) need = Math.max(need, (Math.abs(x - mean) + Math.max(shell, outer[0])) / half);
       }
@@ -379,9 +388,11 @@ const play = (root, data) => {
   };
   /** Shows everything in perspective (0), from the top (1), the front (2) or the side (3). @param {number} k */
   const look = k => { [yaw, pitch, parallel] = VIEWS[k]; fit(); ask(); };
-  /** Centre of the vehicles that are there [m]. */
+  /** Positions of the vehicles that are there [m]. */
+  const present = () => radius.map((_, k) => place(k)).filter(at => at[3]);
+  /** Their centre [m]. */
   const centre = () => {
-    const all = radius.map((_, k) => place(k)).filter(at => at[3]);
+    const all = present();
     return all.length ? [0, 1, 2].map(axis => all.reduce((sum, at) => sum + at[axis], 0) / all.length) : target;
   };
   /** Moves the camera near what it follows. */
@@ -391,8 +402,8 @@ const play = (root, data) => {
       distance = Math.max(16 * outer[picked], 8 * shell);
     } else if (follow.value === "swarm") {
       seek();
-      const at = centre(), all = radius.map((_, k) => place(k)).filter(at => at[3]);
-      const far = Math.max(...all.map(of => Math.hypot(of[0] - at[0], of[1] - at[1], of[2] - at[2])), 0);
+      const at = centre();
+      const far = Math.max(...present().map(of => Math.hypot(of[0] - at[0], of[1] - at[1], of[2] - at[2])), 0);
       distance = 1.15 * (far + Math.max(shell, outer[0])) / TANGENT;
     }
   };
@@ -598,8 +609,7 @@ const play = (root, data) => {
   const bodies = mesh([3], 1, 1, Float32Array.from(radius, of => rotors ? 0.34 * arm : of));
   const shells = mesh([3], 1, 1, Float32Array.from(radius)), slots = mesh([0], 3, 1);
   const links = mesh([2], 3, 1), pairs = mesh([2], 3, 1);
-  const squares = new Float32Array(bytes(data.ground)), ground = mesh([0, 1], 3, 1, squares);
-  const filled = mesh([0, 1], 3, 1);
+  const ground = mesh([0, 1], 3, 1);
   const things = data.things.map(({ solid, rims, ...rest }) => ({ ...rest,
     solid: mesh([0, 1], 3, 0, new Float32Array(bytes(solid))),
     rims: mesh([0, 1], 3, 1, new Float32Array(bytes(rims))) }));
@@ -612,8 +622,7 @@ const play = (root, data) => {
       const [a, b] = [(row * wide + k) * 4, ((row + 1) * wide + k) * 4], long = times[row + 1] - times[row];
       if (path[a + 3] !== path[b + 3] || !path[a + 3] || wrongs.length > 9 * RED) continue;
       const ends = [from_s, to_s].map(end => clamp((end - times[row]) / long, 0, 1));
-      for (const part of ends)
-        wrongs.push(...[0, 1, 2].map(axis => path[a + axis] + (path[b + axis] - path[a + axis]) * part));
+      for (const part of ends) wrongs.push(...mix(path.subarray(a), path.subarray(b), part));
       wrongs.push(...ends.map(part => times[row] - first + part * long), 0);
     }
   const reds = mesh([0, 1, 2], 3, 1, Float32Array.from(wrongs));
@@ -705,14 +714,14 @@ const play = (root, data) => {
   /** Position of a point from the origin [m], and 1 where it is there, else 0. @param {number} k */
   const place = k => {
     const [a, b] = [(row * wide + k) * 4, (next * wide + k) * 4];
-    return [0, 1, 2].map(axis => path[a + axis] + (path[b + axis] - path[a + axis]) * part)
+    return mix(path.subarray(a), path.subarray(b), part)
       .concat(path[a + 3] && (part <= 0 || path[a + 3] === path[b + 3]) ? 1 : 0);
   };
   /** Place of a vehicle in the picture [CSS px], its depth [m], or 0 where it is absent, and pixels per metre. */
   const project = (/** @type {number} */ k) => {
     const [x, y, z, there] = place(k), { right, up, back, eye } = axes();
-    const [across, above, ahead] = [right, up, back].map(axis =>
-      (x - eye[0]) * axis[0] + (y - eye[1]) * axis[1] + (z - eye[2]) * axis[2]);
+    const from = [x - eye[0], y - eye[1], z - eye[2]], [across, above, ahead] = [right, up, back].map(axis =>
+      dot(from, axis));
     const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
     const scale = high / 2 / TANGENT / (parallel ? distance : -ahead);
     return [wide / 2 + across * scale, high / 2 - above * scale, there ? -ahead : 0, scale];
@@ -722,7 +731,7 @@ const play = (root, data) => {
     const k = clamp(upTo(way.map(point => point[0]), t), 0, way.length - 1);
     const [a, b] = [way[Math.max(k - 1, 0)], way[k]];
     const share = b[0] > a[0] ? clamp((t - a[0]) / (b[0] - a[0]), 0, 1) : 1;
-    return [1, 2, 3].map(axis => a[axis] + (b[axis] - a[axis]) * share - data.origin_m[axis - 1]);
+    return mix(a.slice(1), b.slice(1), share).map((x, axis) => x - data.origin_m[axis]);
   };
   /** Fills the meshes of slots and links for the formation of this time. A link has its length in the formation [m]. */
   const reform = () => {
@@ -739,26 +748,23 @@ const play = (root, data) => {
     }
     refill(links, Float32Array.from(joined));
   };
-  const spans = [0, 1].map(axis => {
-    const all = squares.filter((_, k) => k % 3 === axis);
-    return [Math.min(...all), Math.max(...all)];
-  });
   /**
-   * Fills the ground of a parallel view, whose squares reach the edges of the picture.
+   * Fills the ground. In a parallel view its squares reach the edges of the picture.
    * @param {number[]} right @param {number[]} up @param {number} aspect
    */
   const fill = (right, up, aspect) => {
-    const side = data.square_m, ends = spans.map(([low, high], axis) => {
-      const by = TANGENT * distance * (Math.abs(right[axis]) * aspect + Math.abs(up[axis]));
+    const side = data.square_m, [least, most] = data.ground, ends = [0, 1].map(axis => {
+      const low = least[axis], high = most[axis], across = Math.abs(right[axis]) * aspect + Math.abs(up[axis]);
+      const by = !parallel ? 0 : TANGENT * distance * across;
       const more = (/** @type {number} */ gap) => clamp(Math.ceil(gap / side), 0, 99) * side;
       return by < 1e-3 * distance ? [low, high]
         : [low - more(low - target[axis] + by), high + more(target[axis] + by - high)];
     });
     const numbers = [];
     for (const axis of [0, 1]) for (let at = ends[axis][0]; at < ends[axis][1] + side / 2; at += side)
-      for (const end of ends[1 - axis]) numbers.push(...axis ? [end, at] : [at, end], squares[2]);
-    refill(filled, Float32Array.from(numbers));
-    filled.count = numbers.length / 6;
+      for (const end of ends[1 - axis]) numbers.push(...axis ? [end, at] : [at, end], least[2]);
+    refill(ground, Float32Array.from(numbers));
+    ground.count = numbers.length / 6;
   };
   /** Colour of a light at a part of the width of the swarm. @param {number} at */
   const light = at => {
@@ -783,7 +789,7 @@ const play = (root, data) => {
       const across = lit ? [...radius.keys()].map(k => project(k)[0]) : [], low = Math.min(...across);
       const reach = Math.max(...across) - low || 1;
       for (let k = 0; k < count; k++) {
-        const own = lit ? light((across[k] - low) / reach) : colours[`c${count < 200 ? k % 8 + 1 : 1}`];
+        const own = lit ? light((across[k] - low) / reach) : colours[`c${count <= limits.colours ? k % 8 + 1 : 1}`];
         paint.set(who.has(k) ? [...colours.alarm, 0] : [...own, 255], 4 * k);
         paint.set([...own, 255], 4 * (count + k));
       }
@@ -817,7 +823,8 @@ const play = (root, data) => {
       const ends = [colours.pull, colours.push].map(colour => rgba(colour).slice(0, 3));
       if (colouring.value === "clearance") ends.reverse();
       set({ right, up, back, eye, lens, size, parallel: parallel ? distance : 0, path: 0, paint: 1, value: 2, turn: 3,
-        row, next, part, level: squares[2], points: count, spanned, low: ends[0], mid: rgba(colours.rest).slice(0, 3),
+        row, next, part, level: data.ground[0][2], points: count, spanned, low: ends[0],
+        mid: rgba(colours.rest).slice(0, 3),
         high: ends[1], arm, armLeast: 8 * ratio,
         "arms[0]": arms, shell: [0, 0, 0], offset: [0, 0, 0], fixedAt: [0, 0, 0, 0], fixedPaint: [0, 0, 0, 0],
         ...values });
@@ -859,10 +866,12 @@ const play = (root, data) => {
     gl.enable(gl.BLEND);
     gl.depthMask(false);
     use(line, { kind: 0, width: ratio, tint: rgba(colours.floor) });
-    if (parallel) fill(right, up, size[0] / size[1]);
-    if (shows.ground) quads(parallel ? filled : ground);
+    if (shows.ground) {
+      fill(right, up, size[0] / size[1]);
+      quads(ground);
+    }
     // Lines down to the ground and marks there, unless the vehicles hide them.
-    const drops = shows.ground && pitch < 1.3 && count <= 300 ? count : 0;
+    const drops = shows.ground && pitch < 1.3 && count <= limits.drops ? count : 0;
     if (drops) {
       use(mark, { mark: 2, size_m: least_m, least: 3 * ratio, tint: [0, 0, 0, 0.6] });
       quads(null, drops);
@@ -948,7 +957,7 @@ const play = (root, data) => {
       pen.strokeStyle = css(colours.sky);
       // Important vehicles come first, then near ones. A name that would cover another one moves or is left out.
       const urgent = new Set([...picked === null ? [] : [picked], ...closest, ...who]);
-      const wanted = !shows.names ? [] : [...count <= NAMED ? radius.keys() : urgent].map(vehicle =>
+      const wanted = !shows.names ? [] : [...count <= limits.named ? radius.keys() : urgent].map(vehicle =>
         ({ vehicle, seen: project(vehicle) })).filter(({ seen }) => seen[2] > lens[2]);
       wanted.sort((a, b) => +urgent.has(b.vehicle) - +urgent.has(a.vehicle) || a.seen[2] - b.seen[2]);
       const depths = wanted.map(({ seen }) => seen[2]), nearest = Math.min(...depths), far = Math.max(...depths);
@@ -989,7 +998,7 @@ const play = (root, data) => {
   dark.addEventListener("change", themed);
   document.addEventListener("change", themed);
   // A camera as `fit` left it fits again. Any other one keeps what it shows along the shorter side.
-  const narrow = () => Math.min(canvas.clientWidth / canvas.clientHeight || 1, 1);
+  const narrow = () => Math.min(aspect(), 1);
   let narrowed = narrow();
   const sized = new ResizeObserver(() => {
     const before = narrowed, alike = yaw === fitted.yaw && pitch === fitted.pitch && distance === fitted.distance;

@@ -80,9 +80,8 @@ class VectorSimulation:
 
         ``u`` (E, N, 3) or (E, N, 2) are accelerations [m/s^2] that replace those of the law and are held over all of
         these steps. They pass through the shield and the actuators of the scenario. Arrays of float32 and float64 are
-        fastest. No step is divided for the law then. Those of ended worlds are ignored. Without ``u`` the scenario's law
-        flies. ``out`` (E, N, 6) of float32 or float64 receives
-        positions and velocities.
+        fastest. No step is divided for the law then. Those of ended worlds are ignored. Without ``u`` the law of the
+        scenario flies. ``out`` (E, N, 6) of float32 or float64 receives positions and velocities.
 
         Raises :class:`Error` for a wrong shape, or with the place of a number that is not finite; ``TypeError`` for
         numbers that are no float64. No world moves then. Where ``autoreset`` finds no valid start for a world, the

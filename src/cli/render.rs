@@ -11,6 +11,7 @@ use super::console::{Console, Terminal};
 use super::reading::ReadArguments;
 use super::{Exit, completions, drawing};
 use tautline_core::files::{write_atomically, write_atomically_with};
+use tautline_core::swarm::Pair;
 use tautline_render::{
     CameraSpec, Colouring, Extent, Film, FilmFormat, Layers, Picture, RenderError, Renderer, Scene, Theme, Timeline,
     View, contact_sheet,
@@ -97,6 +98,8 @@ pub(super) struct RenderArguments {
 /// Picture to take.
 struct Still {
     time_s: f64,
+    /// Pair that no obstacle may hide.
+    pair: Option<Pair>,
     path: PathBuf,
 }
 
@@ -239,7 +242,7 @@ fn names(written: &[PathBuf]) -> String {
 impl Batch<'_> {
     /// Writes all files.
     fn write_all(&mut self, outputs: &Outputs<'_>) -> Result<(), Failure> {
-        let times: Vec<f64> = outputs.stills.iter().map(|still| still.time_s).collect();
+        let times: Vec<_> = outputs.stills.iter().map(|still| (still.time_s, still.pair)).collect();
         let mut written = Vec::new();
         let shot = self.shoot(&times, |first, pictures| {
             let jobs: Vec<_> = outputs.stills[first..].iter().zip(pictures).collect();
@@ -258,7 +261,7 @@ impl Batch<'_> {
         if let Some(Sheet { path, columns, times_s, size_px }) = &outputs.sheet {
             self.view.size_px = *size_px;
             let mut tiles = Vec::new();
-            self.shoot(times_s, |_, pictures| {
+            self.shoot(&whole(times_s), |_, pictures| {
                 tiles.extend_from_slice(pictures);
                 Ok(())
             })?;
@@ -268,18 +271,19 @@ impl Batch<'_> {
         Ok(())
     }
 
-    /// Takes pictures at these times and passes them on in order, in chunks; the next chunk is drawn meanwhile.
+    /// Takes pictures at these times, each with a pair that it must show, and passes them on in order, in chunks; the
+    /// next chunk is drawn meanwhile.
     fn shoot(
         &mut self,
-        times_s: &[f64],
+        times: &[(f64, Option<Pair>)],
         mut take: impl FnMut(usize, &[Picture]) -> Result<(), Failure> + Send,
     ) -> Result<(), Failure> {
         let picture_bytes = self.view.size_px[0] as usize * self.view.size_px[1] as usize * 4;
         let at_a_time = (WAITING_BYTES / picture_bytes.max(1)).clamp(1, 2 * rayon::current_num_threads());
         let (mut first, mut waiting): (usize, Vec<Picture>) = (0, Vec::new());
-        for times_s in times_s.chunks(at_a_time) {
+        for times in times.chunks(at_a_time) {
             let (drawn, taken) = rayon::join(
-                || times_s.iter().map(|&time_s| self.picture(time_s)).collect::<Result<Vec<_>, Failure>>(),
+                || times.iter().map(|&(time_s, pair)| self.picture(time_s, pair)).collect::<Result<Vec<_>, Failure>>(),
                 || take(first, &waiting),
             );
             taken?;
@@ -294,12 +298,12 @@ impl Batch<'_> {
         let mut out = BufWriter::new(file);
         let pictures = u32::try_from(times_s.len()).unwrap_or(u32::MAX);
         let mut film = Film::new(&mut out, format, self.view.size_px, fps, pictures)?;
-        self.shoot(times_s, |_, pictures| Ok(film.add(pictures)?))?;
+        self.shoot(&whole(times_s), |_, pictures| Ok(film.add(pictures)?))?;
         film.finish()?;
         Ok(out.flush().map_err(RenderError::Write)?)
     }
 
-    fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
+    fn picture(&mut self, time_s: f64, pair: Option<Pair>) -> Result<Picture, Failure> {
         if self.terminal.is_interrupted() {
             return Err(Failure::interrupted());
         }
@@ -309,12 +313,21 @@ impl Batch<'_> {
         let mut pictures = Vec::new();
         for timeline in self.flights {
             let frame = timeline.log.at(time_s).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
-            let camera = self.extent.camera(timeline, &frame, &view)?;
+            // Flights side by side have one direction.
+            let camera = match pair.filter(|_| columns == 1) {
+                Some(pair) => self.extent.camera_on(timeline, &frame, &view, pair)?,
+                None => self.extent.camera(timeline, &frame, &view)?,
+            };
             pictures.push(self.renderer.paint(&Scene::compose(timeline, &self.extent, &frame, &view, camera))?);
         }
         self.terminal.advance(1);
         Ok(contact_sheet(&pictures, columns)?)
     }
+}
+
+/// Returns times of pictures that need not show a pair.
+fn whole(times_s: &[f64]) -> Vec<(f64, Option<Pair>)> {
+    times_s.iter().map(|&time_s| (time_s, None)).collect()
 }
 
 fn write(path: &Path, picture: &Picture) -> Result<(), Failure> {
@@ -345,16 +358,16 @@ fn stills(
     }
     let mut stills = Vec::new();
     for text in wanted {
-        let (time_s, name) = match text {
-            "start" => (start_s, "start".to_owned()),
-            "end" => (end_s, "end".to_owned()),
+        let (time_s, name, pair) = match text {
+            "start" => (start_s, "start".to_owned(), None),
+            "end" => (end_s, "end".to_owned(), None),
             "closest" => {
                 let none = "--at: `closest` needs two vehicles at a time";
                 let closest = timeline
                     .log
                     .closest()
                     .ok_or_else(|| Failure::input("render/no-closest", none, "leave `closest` out of --at"))?;
-                (closest.time_s, "closest".to_owned())
+                (closest.time_s, "closest".to_owned(), Some(closest.pair))
             }
             seconds => {
                 let help = "give start, closest, end or seconds, such as --at start,12.5,end";
@@ -364,7 +377,7 @@ fn stills(
                 // Two times have two names.
                 let rounded = format!("{time_s:.3}");
                 let digits = if rounded.parse() == Ok(time_s) { rounded } else { format!("{time_s:?}") };
-                (time_s, format!("at-{digits}s"))
+                (time_s, format!("at-{digits}s"), None)
             }
         };
         if !(start_s..=end_s).contains(&time_s) {
@@ -377,13 +390,13 @@ fn stills(
         let path = folder.join(format!("{name}.png"));
         // A repeated time gives one picture.
         if stills.iter().all(|still: &Still| still.path != path) {
-            stills.push(Still { time_s, path });
+            stills.push(Still { time_s, pair, path });
         }
     }
     if let Some(every_s) = arguments.every {
         let times = even_times(range_s, every_s, "--every")?;
         let path = |k: usize| folder.join(format!("frame-{:05}.png", k + 1));
-        stills.extend(times.into_iter().enumerate().map(|(k, time_s)| Still { time_s, path: path(k) }));
+        stills.extend(times.into_iter().enumerate().map(|(k, time_s)| Still { time_s, pair: None, path: path(k) }));
     }
     Ok(stills)
 }

@@ -11,15 +11,14 @@ use foxglove::{Encode as _, Schema};
 use nalgebra::UnitQuaternion;
 
 use super::scene::{Colour, Theme};
-use super::timeline::QuadrotorShape;
+use super::timeline::Timeline;
 use tautline_audit::ObjectPair;
 use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::record::{Event, Sample};
 use tautline_core::swarm::{Pair, Rows, row, separation};
-use tautline_laws::graph::Graph;
 use tautline_recordings::mcap::{ExtraTopic, Topic};
-use tautline_report::flight_log::{Violations, attitudes_of};
-use tautline_sim::plan::Plan;
+use tautline_report::flight_log::attitudes_of;
+use tautline_report::replay::Rotors;
 use tautline_sim::scenario::Scenario;
 
 /// Rate of scenes \[Hz\].
@@ -46,39 +45,26 @@ const ROUNDING_S: f64 = 1e-6;
 /// included. Relative to 72 bytes per vehicle and sample at 60 Hz a recording grows by less than a third, and one of
 /// few vehicles by a half. Up to 100 quadrotors have arms and rotors with their attitude, about 1100 bytes each.
 pub struct FoxgloveScene {
-    plan: Plan,
-    radius_m: Vec<f64>,
-    shape: Option<QuadrotorShape>,
-    delta_m: f64,
-    /// Ratio of height to width of shells.
-    shell_ratio: f64,
+    /// Flight without samples.
+    timeline: Timeline,
     next_s: f64,
     schema: Option<Schema>,
-    violations: Violations,
 }
 
 impl FoxgloveScene {
     /// Creates scenes for a flight of this scenario.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
-        Self {
-            plan: Plan::of(scenario),
-            radius_m: scenario.hull_radius_m.clone(),
-            shape: QuadrotorShape::of(scenario),
-            delta_m: scenario.delta_m,
-            shell_ratio: scenario.metric().ratio(),
-            next_s: f64::NEG_INFINITY,
-            schema: SceneUpdate::get_schema(),
-            violations: Violations::default(),
-        }
+        Self { timeline: Timeline::of(scenario), next_s: f64::NEG_INFINITY, schema: SceneUpdate::get_schema() }
     }
 
     fn scene(&self, sample: &Sample<'_>) -> SceneUpdate {
-        let theme = Theme::Dark;
+        let (theme, timeline) = (Theme::Dark, &self.timeline);
+        let obstacles = || timeline.plan.iter().flat_map(|plan| &plan.obstacles);
         let (time_s, positions_m) = (sample.time_s, &sample.swarm.positions_m);
         let count = positions_m.nrows();
         let mut alarm = vec![false; count];
-        let too_close = self.violations.open().filter_map(ObjectPair::vehicles);
+        let too_close = timeline.log.violations().open().filter_map(ObjectPair::vehicles);
         for pair in too_close.filter(|pair| pair.second() < count) {
             (alarm[pair.first()], alarm[pair.second()]) = (true, true);
         }
@@ -89,22 +75,22 @@ impl FoxgloveScene {
         let attitudes = if count <= MAX_QUADROTORS { attitudes_of(sample) } else { Vec::new() };
         let attitude = |k: usize| attitudes.get(k).copied().flatten();
         let quadrotors = (0..count).filter_map(|k| {
-            let shape = self.shape.unwrap_or_else(|| QuadrotorShape::within(self.radius_m[k]));
-            Some(quadrotor(&shape, row(positions_m, k), attitude(k)?, hull_colour(k)))
+            let rotors = timeline.rotors.unwrap_or_else(|| Rotors::within(timeline.radius_m[k]));
+            Some(quadrotor(&rotors, row(positions_m, k), attitude(k)?, hull_colour(k)))
         });
         let quadrotors: Vec<_> = quadrotors.collect();
         let hulls = (0..count).filter(is_shown).filter(|&k| attitude(k).is_none());
-        let hulls = hulls.map(|k| sphere(positions_m, k, self.radius_m[k], hull_colour(k)));
+        let hulls = hulls.map(|k| sphere(positions_m, k, timeline.radius_m[k], hull_colour(k)));
         let bodies = quadrotors.iter().map(|quadrotor| quadrotor.body);
         let rotors = quadrotors.iter().flat_map(|quadrotor| quadrotor.rotors);
-        let solids = self.plan.obstacles.iter().filter_map(|obstacle| match obstacle.shape {
+        let solids = obstacles().filter_map(|obstacle| match obstacle.shape {
             Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
             _ => None,
         });
         let shells = (0..count).filter(is_shown).map(|k| {
             let colour = if alarm[k] { theme.alarm() } else { theme.shell() };
-            let mut shell = sphere(positions_m, k, self.delta_m / 2.0, colour.at(0.15));
-            shell.size.iter_mut().for_each(|size| size.z *= self.shell_ratio);
+            let mut shell = sphere(positions_m, k, timeline.delta_m.unwrap_or(0.0) / 2.0, colour.at(0.15));
+            shell.size.iter_mut().for_each(|size| size.z *= timeline.log.metric().ratio());
             shell
         });
         let mut lines = LinePrimitive {
@@ -113,9 +99,9 @@ impl FoxgloveScene {
             thickness: EDGE_M,
             ..LinePrimitive::default()
         };
-        let few_edges = Some(&self.plan.graph).filter(|graph| graph.edge_count() <= MAX_EDGES);
-        for (i, j) in few_edges.into_iter().flat_map(Graph::edges) {
-            let tension = self.plan.tension(Pair::new(i, j), separation(positions_m, i, j), time_s);
+        let few_edges = timeline.plan.iter().filter(|plan| plan.graph.edge_count() <= MAX_EDGES);
+        for (plan, (i, j)) in few_edges.flat_map(|plan| plan.graph.edges().map(move |edge| (plan, edge))) {
+            let tension = plan.tension(Pair::new(i, j), separation(positions_m, i, j), time_s);
             for place in [i, j].map(|k| row(positions_m, k)) {
                 lines.points.push(Point3 { x: place.x, y: place.y, z: place.z });
                 lines.colors.push(colour(theme.tension(tension).at(0.8)));
@@ -128,8 +114,8 @@ impl FoxgloveScene {
                 frame_id: "world".to_owned(),
                 id: "swarm".to_owned(),
                 spheres: bodies.chain(hulls).chain(shells).chain(solids).collect(),
-                cubes: self.plan.obstacles.iter().filter_map(cube).collect(),
-                cylinders: self.plan.obstacles.iter().filter_map(cylinder).chain(rotors).collect(),
+                cubes: obstacles().filter_map(cube).collect(),
+                cylinders: obstacles().filter_map(cylinder).chain(rotors).collect(),
                 lines: Some(lines)
                     .filter(|lines| !lines.points.is_empty())
                     .into_iter()
@@ -162,8 +148,7 @@ impl ExtraTopic for FoxgloveScene {
     }
 
     fn note(&mut self, event: &Event) {
-        self.plan.note(event);
-        self.violations.note(event, self.delta_m, self.radius_m.len());
+        self.timeline.note(event);
     }
 }
 
@@ -230,13 +215,13 @@ struct QuadrotorParts {
 
 /// Returns the parts of a quadrotor at a position \[m\].
 fn quadrotor(
-    shape: &QuadrotorShape,
+    shape: &Rotors,
     place_m: nalgebra::Vector3<f64>,
     attitude: UnitQuaternion<f64>,
     shown: Colour,
 ) -> QuadrotorParts {
-    let (arm_m, side) = (shape.arm_m(), 2.0 * shape.rotor_radius_m);
-    let rotors = shape.rotors_m.map(|rotor_m| CylinderPrimitive {
+    let (arm_m, side) = (shape.arm_m(), 2.0 * shape.radius_m);
+    let rotors = shape.places_m(0.0).map(|rotor_m| CylinderPrimitive {
         pose: Some(pose(place_m + attitude * rotor_m, attitude)),
         size: Some(Vector3 { x: side, y: side, z: ROTOR * arm_m }),
         bottom_scale: 1.0,
@@ -244,7 +229,7 @@ fn quadrotor(
         color: Some(colour(shown.at(OPACITY))),
     });
     let ahead_m = nalgebra::Vector3::x() * (AHEAD * arm_m);
-    let ends = shape.rotors_m.into_iter().chain([ahead_m]);
+    let ends = shape.places_m(0.0).into_iter().chain([ahead_m]);
     let arms = LinePrimitive {
         r#type: LineType::LineList.into(),
         pose: Some(pose(place_m, attitude)),
@@ -371,7 +356,7 @@ mod tests {
         let front = |entity: &SceneEntity| entity.cylinders[0].pose.expect("a pose");
         let (position, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
         // A vehicle that flies ahead tilts its front down.
-        let x = QuadrotorShape::within(0.25).rotors_m[0].x;
+        let x = Rotors::within(0.25).at_m[0][0];
         assert!(
             (position.x - place.x - x * 0.4_f64.cos()).abs() < 1e-12
                 && (position.z - place.z + x * 0.4_f64.sin()).abs() < 1e-12

@@ -44,7 +44,8 @@ pub use picture::{Picture, contact_sheet, data_uri};
 pub use run_pictures::{RunPictures, Snapshot, snapshot_names, snapshots_of_run};
 pub use scene::{Adjustment, CameraSpec, Colouring, Extent, Layers, Scene, Theme, View};
 pub use tautline_report::flight_log::{FlightLog, Frame, Keyframe};
+pub use tautline_report::replay::Rotors;
 pub use tautline_sim::plan::Plan;
-pub use timeline::{QuadrotorShape, Timeline, TracksError};
+pub use timeline::{Timeline, TracksError};
 #[cfg(feature = "window")]
 pub use window::{LiveUpdate, WINDOW_KEYS, is_in_window_library, show};

@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use crate::scene::metres;
+use crate::scene::{Camera, metres};
 use crate::{Extent, FoxgloveScene, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, data_uri};
 use tautline_core::failure::Failure;
 use tautline_core::monitor::Monitor;
 use tautline_core::record::Event;
-use tautline_core::swarm::Pair;
 use tautline_recordings::mcap::ExtraTopic;
-use tautline_report::flight_log::{FlightLog, PICTURED};
+use tautline_report::flight_log::{FlightLog, Frame, PICTURED};
 use tautline_report::report::{Report, page};
 use tautline_report::request::{NamedPicture, PICTURES_BYTES, Pictures, write_files};
 use tautline_sim::plan::Plan;
@@ -121,6 +120,9 @@ pub fn snapshot_names() -> Vec<String> {
     ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(numbered).collect()
 }
 
+/// Camera of a frame.
+type CameraOf<'a> = dyn Fn(&Frame) -> Result<Camera, RenderError> + 'a;
+
 /// Draws the start, the closest approach, the ends of the first ten legs, the end, the first violation of an obstacle's
 /// clearance, and the first ten violations of two vehicles. Returns no picture for a flight without samples.
 ///
@@ -133,23 +135,20 @@ pub fn snapshots_of_run(
 ) -> Result<Vec<Snapshot>, RenderError> {
     let extent = Extent::of(timeline);
     let mut snapshots = Vec::new();
-    // The camera frames the whole flight, or the pair if one is given.
-    let mut shoot = |name: &str, description: String, time_s: f64, pair: Option<Pair>| {
+    let mut shoot = |name: &str, description: String, time_s: f64, camera: &CameraOf<'_>| {
         let Some(frame) = timeline.log.at(time_s) else { return Ok(()) };
-        let camera = match pair {
-            Some(pair) => extent.close_up(timeline, &frame, pair, view),
-            None => extent.camera(timeline, &frame, view)?,
-        };
+        let camera = camera(&frame)?;
         let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, view, camera))?;
         snapshots.push(Snapshot { name: name.to_owned(), description, picture });
         Ok::<(), RenderError>(())
     };
     let [start_s, end_s] = timeline.log.range_s();
-    shoot("start", format!("The start, at {start_s:.2} s."), start_s, None)?;
+    let whole = |frame: &Frame| extent.camera(timeline, frame, view);
+    shoot("start", format!("The start, at {start_s:.2} s."), start_s, &whole)?;
     if let Some(closest) = timeline.log.closest() {
         let (pair, time_s, apart) = (closest.pair, closest.time_s, metres(closest.separation_m));
         let what = format!("The closest approach of the flight: vehicles {pair} at {time_s:.2} s, {apart} apart.");
-        shoot("closest", what, time_s, None)?;
+        shoot("closest", what, time_s, &|frame| extent.camera_on(timeline, frame, view, pair))?;
     }
     // A leg ends when the next one begins.
     let legs = timeline.log.targets().iter().filter_map(|event| match event {
@@ -157,18 +156,19 @@ pub fn snapshots_of_run(
         _ => None,
     });
     for (leg, time_s) in legs {
-        shoot(&format!("leg-{leg}"), format!("The end of leg {leg}, at {time_s:.2} s."), time_s.next_down(), None)?;
+        shoot(&format!("leg-{leg}"), format!("The end of leg {leg}, at {time_s:.2} s."), time_s.next_down(), &whole)?;
     }
-    shoot("end", format!("The end, at {end_s:.2} s."), end_s, None)?;
+    shoot("end", format!("The end, at {end_s:.2} s."), end_s, &whole)?;
     if let Some((near, [vehicle, obstacle])) = timeline.log.violations().of_obstacles().next() {
         let (vehicle, obstacle) = (&timeline.vehicles[vehicle], timeline.obstacle(obstacle));
         let what = format!("Vehicle {vehicle} came too close to {obstacle} at {:.2} s.", near.from_s);
-        shoot("obstacle", what, f64::midpoint(near.from_s, near.to_s.min(end_s)), None)?;
+        shoot("obstacle", what, f64::midpoint(near.from_s, near.to_s.min(end_s)), &whole)?;
     }
     for (k, span) in timeline.log.violations().of_vehicles().take(PICTURED).enumerate() {
         let (pair, from_s, to_s) = (span.pair, span.from_s, span.to_s.min(end_s));
         let what = format!("Vehicles {pair} were closer than delta from {from_s:.2} s to {to_s:.2} s.");
-        shoot(&format!("violation-{}", k + 1), what, span.min_at_s, Some(pair))?;
+        let near = |frame: &Frame| Ok(extent.close_up(timeline, frame, pair, view));
+        shoot(&format!("violation-{}", k + 1), what, span.min_at_s, &near)?;
     }
     Ok(snapshots)
 }

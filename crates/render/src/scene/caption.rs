@@ -1,21 +1,17 @@
 //! Text of a picture: caption, verdict, legend, names of vehicles, and separations of pairs.
 
-use super::camera::{Lens, Projected};
+use super::camera::Projected;
 use super::colour::{Colour, Colouring};
 use super::compose::SceneBuilder;
 use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
 use super::{Annotation, pixels};
 use tautline_audit::{Status, Violation};
-use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{at_least, beside_limit, exact};
-use tautline_report::replay::is_between;
+use tautline_report::replay::LIMITS;
 use tautline_sim::plan::Plan;
 
-/// Number of vehicles up to which all names are drawn. A larger swarm has only those of the picked vehicle, of the
-/// closest pair and of the worst violations.
-const MAX_NAMED: usize = 24;
 /// Largest number of pairs closer than delta whose separation is drawn; the closest pairs are chosen.
 const MAX_LABELLED: usize = 3;
 /// Number of colours on each side of the legend's scale.
@@ -368,7 +364,7 @@ impl SceneBuilder<'_> {
         let violated = self.violated.iter().take(MAX_LABELLED).map(|(violation, _)| violation.pair);
         let nearest = self.closest_clear_pair().filter(|_| self.view.layers.closest).map(|(pair, _)| pair);
         labelled.extend(violated.chain(nearest).flat_map(|pair| [pair.first(), pair.second()]));
-        if self.timeline.count() <= MAX_NAMED {
+        if self.timeline.count() <= LIMITS.named {
             labelled.extend(0..self.timeline.count());
         }
         let mut seen = vec![false; self.timeline.count()];
@@ -426,7 +422,7 @@ impl SceneBuilder<'_> {
 
     /// Returns whether another vehicle or an obstacle covers the centre of this one.
     fn is_hidden(&self, k: usize, own: Projected) -> bool {
-        if self.is_behind_obstacle(k) {
+        if self.vehicle(k).is_some_and(|place| self.extent.is_behind_obstacle(self.timeline, &self.camera, place)) {
             return true;
         }
         let others = (0..self.timeline.count()).filter(|&other| other != k);
@@ -434,22 +430,6 @@ impl SceneBuilder<'_> {
             let apart = (projection.at_px[0] - own.at_px[0]).hypot(projection.at_px[1] - own.at_px[1]);
             projection.depth_m < own.depth_m && apart < self.timeline.radius_m[other] * projection.px_per_m
         })
-    }
-
-    /// Returns whether a solid obstacle is between the camera and a vehicle.
-    fn is_behind_obstacle(&self, k: usize) -> bool {
-        let Some(place) = self.vehicle(k) else { return false };
-        let distance_m = self.camera.project(place).map_or(0.0, |projection| projection.depth_m);
-        let towards = match self.camera.lens {
-            Lens::Perspective(_) => self.camera.eye_m - place,
-            Lens::Parallel(_) => self.camera.back * distance_m,
-        };
-        let is_solid = |shape: &Shape| !matches!(shape, Shape::HalfSpace { .. });
-        let (from_m, obstacles) =
-            (place + self.extent.origin_m(), self.timeline.plan.iter().flat_map(|plan| &plan.obstacles));
-        obstacles
-            .filter(|obstacle| is_solid(&obstacle.shape))
-            .any(|obstacle| is_between(&obstacle.shape, obstacle.place_m, from_m, from_m + towards))
     }
 
     /// Returns the names of the two vehicles of a pair, in words and in short.

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use tautline_report::replay::LIMITS;
+
 /// Colour in sRGB with straight alpha, 8 bits per channel.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -92,8 +94,6 @@ const RAMP_ON_DARK: [u32; 4] = [0x5B_8D_EF, 0xB9_7A_E0, 0xF0_72_8F, 0xFF_C2_3D];
 const LIGHTS: [u32; 4] = [0xFF_C2_3D, 0x6F_E3_9A, 0x4F_B8_FF, 0xB0_94_FF];
 const NIGHT: Colour = Colour::hex(0x06_0A_18);
 
-/// Number of vehicles from which on all have one colour.
-const ONE_COLOUR: usize = 200;
 /// Colours of vehicles in order, as in the charts, from Paul Tol's colour-blind safe schemes (technical note
 /// SRON/EPS/TN/09-002, issue 3.2). The dark theme has the scheme "light" without grey. The light theme has "muted".
 /// There the light blue of "medium-contrast" replaces cyan and sand, and teal is darker, for a contrast of 3 on white.
@@ -136,9 +136,9 @@ impl Theme {
         Colour::hex(palette[k % palette.len()])
     }
 
-    /// Returns the colour of vehicle `k` of `count`; from 200 vehicles on all have one colour.
+    /// Returns the colour of vehicle `k` of `count`.
     pub(crate) fn vehicle_among(self, k: usize, count: usize) -> Colour {
-        self.vehicle(if count < ONE_COLOUR { k } else { 0 })
+        self.vehicle(if count <= LIMITS.colours { k } else { 0 })
     }
 
     /// Keep-out shells.

@@ -12,17 +12,11 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use tautline_audit::Violation;
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_report::flight_log::Frame;
+use tautline_report::replay::LIMITS;
 use tautline_sim::plan::Plan;
 
 /// Largest width, and largest height, of a picture without a legend \[pixels\].
 const NO_LEGEND_PX: [u32; 2] = [420, 260];
-/// Largest number of vehicles with whole trails, and with trails of five seconds. A larger swarm has one second.
-const WHOLE_TRAILS: usize = 24;
-const LONG_TRAILS: usize = 99;
-/// Largest number of vehicles with start marks and goal slots, and of edges, in the view of a flight. More would hide
-/// the formation.
-const MARKED: usize = 60;
-const LINKED: usize = 40;
 
 /// Layers of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,8 +55,8 @@ impl Layers {
     /// Returns the layers that do not hide the formation of a flight.
     #[must_use]
     pub fn of(timeline: &Timeline) -> Self {
-        let edges = timeline.plan.as_ref().map_or(0, |plan| plan.graph.edge_count()) <= LINKED;
-        Self { edges, marks: timeline.count() <= MARKED, ..Self::ALL }
+        let edges = timeline.plan.as_ref().map_or(0, |plan| plan.graph.edge_count()) <= LIMITS.links;
+        Self { edges, marks: timeline.count() <= LIMITS.slots, ..Self::ALL }
     }
 }
 
@@ -110,8 +104,8 @@ impl View {
     #[must_use]
     pub fn of(timeline: &Timeline) -> Self {
         let trail_s = match timeline.count() {
-            count if count <= WHOLE_TRAILS => None,
-            count if count <= LONG_TRAILS => Some(5.0),
+            count if count <= LIMITS.trails[0] => None,
+            count if count <= LIMITS.trails[1] => Some(5.0),
             _ => Some(1.0),
         };
         let view = Self { layers: Layers::of(timeline), trail_s, ..Self::default() };

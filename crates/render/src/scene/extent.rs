@@ -4,14 +4,14 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Vector3;
 
-use super::camera::{Area, Camera, CameraSpec, Direction};
+use super::camera::{Area, Camera, CameraSpec, Direction, Lens};
 use super::compose::View;
 use crate::error::RenderError;
 use crate::timeline::Timeline;
 use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_report::flight_log::{Frame, Keyframe};
-use tautline_report::replay::Viewpoint;
+use tautline_report::replay::{Viewpoint, is_between, round_step, turns_deg};
 
 /// Largest number of vehicle positions that framing uses.
 const FRAMED_PLACES: usize = 200_000;
@@ -213,10 +213,7 @@ impl Extent {
     pub fn camera(&self, timeline: &Timeline, frame: &Frame, view: &View) -> Result<Camera, RenderError> {
         let area = view.area(self.has_violations);
         let camera = match &view.camera {
-            CameraSpec::Auto => match self.swarm_at(frame.time_s).filter(|_| self.travels) {
-                Some(corners) => Camera::framing(self.auto, &corners, area),
-                None => self.framing(self.auto, area),
-            },
+            CameraSpec::Auto => self.overview(self.auto, frame, area),
             CameraSpec::Perspective => self.framing(self.oblique, area),
             CameraSpec::Top => self.framing(Direction::TOP, area),
             CameraSpec::Front => self.framing(Direction::FRONT, area),
@@ -241,6 +238,58 @@ impl Extent {
             },
         };
         Ok(camera.adjusted(&view.adjustment))
+    }
+
+    /// Returns the camera of a view for a picture of a pair. If an obstacle hides a vehicle of the pair, the camera
+    /// `Auto` turns until both are seen and the fewest other vehicles are hidden, by the smallest such angle.
+    ///
+    /// # Errors
+    /// As [`Extent::camera`].
+    pub fn camera_on(
+        &self,
+        timeline: &Timeline,
+        frame: &Frame,
+        view: &View,
+        pair: Pair,
+    ) -> Result<Camera, RenderError> {
+        let camera = self.camera(timeline, frame, view)?;
+        let is_hidden = |camera: &Camera, k: usize| {
+            let aside = camera.right * timeline.radius_m[k];
+            let places = self.place(&frame.positions_m, k).map(|place| [place - aside, place, place + aside]);
+            places.into_iter().flatten().any(|place| self.is_behind_obstacle(timeline, camera, place))
+        };
+        let is_pair_hidden = |camera: &Camera| is_hidden(camera, pair.first()) || is_hidden(camera, pair.second());
+        if view.camera != CameraSpec::Auto || !is_pair_hidden(&camera) {
+            return Ok(camera);
+        }
+        let turned = turns_deg().map(|turn_deg| {
+            let direction = Direction { azimuth_deg: self.auto.azimuth_deg + turn_deg, ..self.auto };
+            self.overview(direction, frame, view.area(self.has_violations)).adjusted(&view.adjustment)
+        });
+        let hidden = |camera: &Camera| (0..timeline.count()).filter(|&k| is_hidden(camera, k)).count();
+        Ok(turned.filter(|camera| !is_pair_hidden(camera)).min_by_key(hidden).unwrap_or(camera))
+    }
+
+    /// Returns whether a solid obstacle is between a camera and a position in scene coordinates.
+    pub(super) fn is_behind_obstacle(&self, timeline: &Timeline, camera: &Camera, place: Vector3<f64>) -> bool {
+        let distance_m = camera.project(place).map_or(0.0, |projection| projection.depth_m);
+        let towards = match camera.lens {
+            Lens::Perspective(_) => camera.eye_m - place,
+            Lens::Parallel(_) => camera.back * distance_m,
+        };
+        let from_m = place + self.origin_m;
+        timeline.plan.iter().flat_map(|plan| &plan.obstacles).any(|obstacle| {
+            !matches!(obstacle.shape, Shape::HalfSpace { .. })
+                && is_between(&obstacle.shape, obstacle.place_m, from_m, from_m + towards)
+        })
+    }
+
+    /// Returns a camera in a direction that frames the flight, or the swarm if it travels far.
+    fn overview(&self, direction: Direction, frame: &Frame, area: Area) -> Camera {
+        match self.swarm_at(frame.time_s).filter(|_| self.travels) {
+            Some(corners) => Camera::framing(direction, &corners, area),
+            None => self.framing(direction, area),
+        }
     }
 
     /// Returns a camera near a pair, or one that frames the flight if a vehicle of the pair is absent.
@@ -347,15 +396,6 @@ fn find(timeline: &Timeline, name: &str) -> Result<usize, RenderError> {
     })
 }
 
-/// Returns the smallest of 1, 2 and 5 times a power of ten at or above a length; 1 for an invalid length.
-fn round_step(length_m: f64) -> f64 {
-    if !(length_m > 0.0 && length_m.is_finite()) {
-        return 1.0;
-    }
-    let power = 10.0_f64.powf(length_m.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|&step| step >= length_m).unwrap_or(power)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -372,12 +412,5 @@ mod tests {
             let beyond = (around.centre - smooth.centre).abs() + around.half - smooth.half;
             assert!(beyond.max() <= 1e-12, "{around:?} {smooth:?}");
         }
-    }
-
-    #[test]
-    fn ground_steps_are_round_numbers() {
-        let steps = [0.9, 1.0, 1.1, 3.0, 7.0, 0.03, 1234.0].map(round_step);
-        assert_eq!(steps, [1.0, 1.0, 2.0, 5.0, 10.0, 0.05, 2000.0]);
-        assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(round_step), [1.0; 4]);
     }
 }

@@ -9,13 +9,11 @@ use super::colour::{Colour, Colouring, Theme};
 use super::compose::SceneBuilder;
 use super::extent::is_level;
 use super::{Ball, Disc, Face, Line, Scene, single};
-use crate::timeline::QuadrotorShape;
 use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::Pair;
+use tautline_report::replay::{LIMITS, MOST_LINKS, Rotors};
 use tautline_sim::plan::Plan;
 
-/// Largest number of edges that are drawn; more would hide the vehicles.
-const MAX_EDGES: usize = 2100;
 /// Largest number of line pieces of all trails together, and of one trail.
 const MAX_TRAIL_PIECES: usize = 60_000;
 const MAX_PIECES_PER_TRAIL: usize = 400;
@@ -40,8 +38,6 @@ const APART: f64 = 1.5;
 /// Opacity of the line from a vehicle to the ground, and of the mark there.
 const DROP: f32 = 0.4;
 const GROUND_MARK: f32 = 0.6;
-/// Largest number of vehicles with lines to the ground and ground marks.
-const MAX_DROPS: usize = 300;
 /// Sine of the elevation above which the ground below a vehicle is hidden by it.
 const STRAIGHT_DOWN: f64 = 0.97;
 /// Smallest radius of a ground mark and of a glow in a picture 720 pixels high \[pixels\].
@@ -58,7 +54,7 @@ const MIN_RADIUS_PX: [f32; 3] = [2.0, 3.0, 4.0];
 
 /// Returns whether a graph has few enough edges to be drawn.
 pub(super) fn has_few_edges(plan: &Plan) -> bool {
-    plan.graph.edge_count() <= MAX_EDGES
+    plan.graph.edge_count() <= MOST_LINKS
 }
 
 impl SceneBuilder<'_> {
@@ -199,7 +195,7 @@ impl SceneBuilder<'_> {
     /// Returns the vehicles with lines to the ground, with their positions and the points on the ground below.
     fn drops(&self) -> impl Iterator<Item = (usize, [Vector3<f64>; 2])> {
         let (count, ground_m) = (self.timeline.count(), self.extent.ground_m[0].z);
-        let shown = if count <= MAX_DROPS && self.camera.back.z < STRAIGHT_DOWN { count } else { 0 };
+        let shown = if count <= LIMITS.drops && self.camera.back.z < STRAIGHT_DOWN { count } else { 0 };
         (0..shown).filter_map(move |k| {
             let place = self.vehicle(k)?;
             Some((k, [place, Vector3::new(place.x, place.y, ground_m)]))
@@ -460,7 +456,7 @@ const BLADE: f32 = 0.75;
 pub(super) struct Quadrotor {
     place: Vector3<f64>,
     attitude: UnitQuaternion<f64>,
-    shape: QuadrotorShape,
+    rotors: Rotors,
     arm_m: f64,
 }
 
@@ -487,8 +483,7 @@ impl Quadrotor {
 
     /// Returns the centres of the rotors \[m\].
     fn rotors(&self) -> [Vector3<f64>; 4] {
-        let above = Vector3::z() * (ABOVE * self.arm_m);
-        self.shape.rotors_m.map(|rotor_m| self.at(rotor_m + above))
+        self.rotors.places_m(ABOVE * self.arm_m).map(|rotor_m| self.at(rotor_m))
     }
 
     /// Returns the unit vector along the thrust.
@@ -508,10 +503,8 @@ impl SceneBuilder<'_> {
             return None;
         }
         let enlarged = (MIN_HULL_PX * f64::from(self.view.unit_px()) / radius_px).max(1.0);
-        let mut shape = self.timeline.shape.unwrap_or_else(|| QuadrotorShape::within(radius_m));
-        shape.rotors_m = shape.rotors_m.map(|rotor_m| rotor_m * enlarged);
-        shape.rotor_radius_m *= enlarged;
-        Some(Quadrotor { place, attitude, shape, arm_m: shape.arm_m() })
+        let rotors = self.timeline.rotors.unwrap_or_else(|| Rotors::within(radius_m)).scaled(enlarged);
+        Some(Quadrotor { place, attitude, rotors, arm_m: rotors.arm_m() })
     }
 
     fn quadrotors(&self) -> impl Iterator<Item = (Quadrotor, Colour)> {
@@ -524,7 +517,7 @@ impl SceneBuilder<'_> {
         for (quadrotor, colour) in self.quadrotors() {
             let (normal, colour) = (single(quadrotor.up()), colour.at(DISC));
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
-            let radius_m = quadrotor.shape.rotor_radius_m as f32;
+            let radius_m = quadrotor.rotors.radius_m as f32;
             let disc = |centre| Disc { centre_m: single(centre), radius_m, normal, glow: 0.0, colour };
             ordered.extend(quadrotor.rotors().map(|centre| (self.camera.in_camera_frame(centre).z, disc(centre))));
         }
@@ -545,7 +538,7 @@ impl SceneBuilder<'_> {
             let across = quadrotor.up().cross(&self.camera.back).try_normalize(1e-6);
             for rotor in quadrotor.rotors() {
                 lines.push(Line::new([quadrotor.place, rotor], colour, width_px));
-                let reach = across.map(|across| across * quadrotor.shape.rotor_radius_m);
+                let reach = across.map(|across| across * quadrotor.rotors.radius_m);
                 let blade = reach.map(|reach| [rotor - reach, rotor + reach]);
                 lines.extend(blade.map(|ends| Line::new(ends, colour.at(BLADE), BLADE_PX * unit_px)));
             }

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::*;
 use crate::timeline::Timeline;
 use tautline_audit::Status;
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::record::{Event, Sample};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::formation::Formation;
@@ -309,6 +310,30 @@ fn the_automatic_camera_shows_every_vehicle_at_the_start_among_obstacles() {
     let named = |text: &str| words(&scene(&timeline, 0.0, &View { layers, ..camera(text) })).len();
     assert_eq!(named("auto"), 8);
     assert!(named("-66,28,40") < 8, "a pillar hides vehicles from the usual direction");
+}
+
+#[test]
+fn the_automatic_camera_turns_until_no_obstacle_hides_the_pair() {
+    let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
+    let mut timeline = Timeline::of(&scenario);
+    timeline.take(&Sample::new(0.0, 0, &scenario.start, &Rows::zeros(scenario.count())));
+    let (extent, frame) = (Extent::of(&timeline), timeline.log.at(0.0).expect("a frame"));
+    let pair = Pair::new(0, 1);
+    let cameras = |timeline: &Timeline, view: &View| {
+        let usual = extent.camera(timeline, &frame, view).expect("a camera");
+        (usual, extent.camera_on(timeline, &frame, view, pair).expect("a camera"))
+    };
+    let (usual, shown) = cameras(&timeline, &camera("auto"));
+    assert_eq!(usual, shown, "nothing is hidden");
+    let place = |k: usize| extent.place(&frame.positions_m, k).expect("present");
+    let plan = timeline.plan.as_mut().expect("a plan");
+    let place_m = usual.eye_m.lerp(&place(1), 0.7) + extent.origin_m();
+    plan.obstacles.push(Obstacle { shape: Shape::Ball { radius_m: 0.3 }, place_m, ..plan.obstacles[0].clone() });
+    let (usual, shown) = cameras(&timeline, &camera("auto"));
+    let hides = |camera: &Camera| [0, 1].map(|k| extent.is_behind_obstacle(&timeline, camera, place(k)));
+    assert_eq!((hides(&usual), hides(&shown)), ([false, true], [false; 2]));
+    let (usual, shown) = cameras(&timeline, &camera("perspective"));
+    assert_eq!(usual, shown, "a camera of choice stays");
 }
 
 #[test]
@@ -671,9 +696,10 @@ mod quadrotors {
     use nalgebra::{UnitQuaternion, Vector3};
 
     use super::super::*;
-    use crate::timeline::{QuadrotorShape, Timeline};
+    use crate::timeline::Timeline;
     use tautline_core::record::{Channel, Sample};
     use tautline_core::swarm::{Rows, Swarm};
+    use tautline_report::replay::Rotors;
 
     const ABOVE: f64 = 0.18;
     const PLACES_M: [f64; 6] = [0.0, 0.0, 1.0, 3.0, 0.0, 1.0];
@@ -703,12 +729,12 @@ mod quadrotors {
 
     /// Returns the largest distance of discs from the rotors of both vehicles at an attitude \[m\].
     fn off_m(timeline: &Timeline, attitude: UnitQuaternion<f64>) -> f64 {
-        let (shape, origin_m) = (QuadrotorShape::within(0.25), Extent::of(timeline).origin_m());
+        let (rotors, origin_m) = (Rotors::within(0.25), Extent::of(timeline).origin_m());
         let scene = scene(timeline, [1280, 720]);
         assert_eq!(scene.discs.len(), 8);
         let expected = PLACES_M.chunks_exact(3).flat_map(|place| {
             let place = Vector3::new(place[0], place[1], place[2]) - origin_m;
-            shape.rotors_m.map(|rotor_m| place + attitude * (rotor_m + Vector3::z() * (ABOVE * shape.arm_m())))
+            rotors.places_m(ABOVE * rotors.arm_m()).map(|rotor_m| place + attitude * rotor_m)
         });
         let nearest = |rotor: Vector3<f64>| {
             let off = |disc: &Disc| {

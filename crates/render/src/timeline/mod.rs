@@ -3,14 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::Vector3;
-
 use crate::error::{RenderError, check_lengths};
 use tautline_audit::{ObjectPair, Status, Violation};
 use tautline_core::record::{Event, Sample};
 use tautline_laws::space::Metric;
 use tautline_recordings::mcap::{Entry, McapRecording, StoredAudit};
 use tautline_report::flight_log::FlightLog;
+use tautline_report::replay::Rotors;
 use tautline_sim::plan::Plan;
 use tautline_sim::scenario::{Scenario, Source};
 
@@ -20,44 +19,6 @@ pub use tracks::TracksError;
 
 /// Radius of a vehicle without a known radius \[m\].
 const UNKNOWN_RADIUS_M: f64 = 0.1;
-/// Distance of the rotors from the centre, and their radius, over the radius of the hull, for an unknown model.
-const ARM: f64 = 0.66;
-const ROTOR: f64 = 0.33;
-
-/// Positions and size of the rotors of a quadrotor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct QuadrotorShape {
-    /// Centres of the rotors relative to the centre of the body, x ahead and y to the left \[m\].
-    pub rotors_m: [Vector3<f64>; 4],
-    /// Radius of each rotor \[m\].
-    pub rotor_radius_m: f64,
-}
-
-impl QuadrotorShape {
-    /// Returns the shape of a scenario's model, if its vehicles are quadrotors.
-    pub(crate) fn of(scenario: &Scenario) -> Option<Self> {
-        let model = &scenario.airframe.quadrotor()?.model;
-        let rotors_m = model.rotor_positions_m.map(|[x, y]| Vector3::new(x, y, 0.0));
-        Some(Self { rotors_m, rotor_radius_m: model.rotor_radius_m })
-    }
-
-    /// Creates four rotors within a hull of this radius \[m\].
-    #[must_use]
-    pub fn within(hull_radius_m: f64) -> Self {
-        let out = hull_radius_m * ARM * std::f64::consts::FRAC_1_SQRT_2;
-        let rotors_m = [[1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
-        Self {
-            rotors_m: rotors_m.map(|[x, y]| Vector3::new(x * out, y * out, 0.0)),
-            rotor_radius_m: hull_radius_m * ROTOR,
-        }
-    }
-
-    /// Returns the distance of the outermost rotor from the centre \[m\].
-    #[must_use]
-    pub fn arm_m(&self) -> f64 {
-        self.rotors_m.iter().map(Vector3::norm).fold(0.0, f64::max)
-    }
-}
 
 /// Flight with everything that its pictures show: the log, and data that are constant over the flight.
 #[derive(Clone, Debug)]
@@ -71,7 +32,7 @@ pub struct Timeline {
     /// Safety distance delta \[m\], if the flight is judged by one.
     pub delta_m: Option<f64>,
     /// Rotors of every vehicle, if the flight has a model.
-    pub shape: Option<QuadrotorShape>,
+    pub rotors: Option<Rotors>,
     /// Formation and graph, if the flight has them.
     pub plan: Option<Plan>,
     /// Notes on how the flight was read, one sentence each.
@@ -99,7 +60,7 @@ impl Timeline {
             vehicles: (1..=vehicles).map(|number| number.to_string()).collect(),
             radius_m: vec![UNKNOWN_RADIUS_M; vehicles],
             delta_m: None,
-            shape: None,
+            rotors: None,
             plan: None,
             notes: Vec::new(),
             log: Arc::default(),
@@ -125,7 +86,7 @@ impl Timeline {
         Self {
             radius_m: scenario.hull_radius_m.clone(),
             delta_m: Some(scenario.delta_m),
-            shape: QuadrotorShape::of(scenario),
+            rotors: Rotors::of(scenario),
             plan: Some(plan),
             log,
             ..Self::new(&scenario.name, scenario.count())

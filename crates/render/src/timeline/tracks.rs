@@ -53,7 +53,8 @@ impl Timeline {
         recording: &mut T,
         delta_m: Option<f64>,
     ) -> Result<Self, TracksError<T::Error>> {
-        let mut audit = RecordingAudit::new(delta_m);
+        let settings = Settings::delta(delta_m.unwrap_or(NO_DELTA_M));
+        let mut audit = TrackAuditor::new(settings).map(TrackAuditor::with_smallest);
         let tracks = read(recording, &mut audit)?;
         let mut timeline = Self::new(name, tracks.len());
         timeline.delta_m = delta_m;
@@ -65,7 +66,7 @@ impl Timeline {
         timeline.by_radii = !tracks.is_empty() && tracks.iter().all(|track| track.radius_m.is_some());
         timeline.assumes_straight = tracks.iter().any(|track| !track.samples.is_empty());
         let mut places = vec![0; tracks.len()];
-        let (judged, mut log) = (audit.finish(), FlightLog::default());
+        let (judged, mut log) = (audit.and_then(TrackAuditor::finish), FlightLog::default());
         for time_s in common_times(&tracks, &moments_s(&judged)) {
             let mut positions_m = Rows::zeros(tracks.len());
             for (k, track) in tracks.iter().enumerate() {
@@ -83,10 +84,10 @@ impl Timeline {
     }
 }
 
-/// Reads all motion, by vehicle.
+/// Reads all motion, by vehicle. Refused motion is drawn and labelled as not judged.
 fn read<T: Tracks + ?Sized>(
     recording: &mut T,
-    audit: &mut RecordingAudit,
+    audit: &mut Result<TrackAuditor, RecordedError>,
 ) -> Result<Vec<VehicleTrack>, TracksError<T::Error>> {
     let (mut tracks, mut items): (Vec<VehicleTrack>, _) = (Vec::new(), Vec::new());
     let (mut more, mut first) = (true, true);
@@ -95,7 +96,11 @@ fn read<T: Tracks + ?Sized>(
             more = recording.read(&mut items).map_err(TracksError::Read)?;
         }
         first = false;
-        audit.push(recording.vehicles(), &items);
+        if let Ok(auditor) = audit
+            && let Err(refused) = auditor.push(recording.vehicles(), &items)
+        {
+            *audit = Err(refused);
+        }
         for item in items.drain(..) {
             let k = item.vehicle();
             if tracks.len() <= k {
@@ -177,30 +182,6 @@ fn common_times(tracks: &[VehicleTrack], moments_s: &[f64]) -> Vec<f64> {
 
 /// Safety distance of a recording that is drawn without limits \[m\]; only the closest approach is used.
 const NO_DELTA_M: f64 = 1e-9;
-
-/// Audit of a recording while it is read. Refused motion is drawn and labelled as not judged.
-struct RecordingAudit {
-    auditor: Result<TrackAuditor, RecordedError>,
-}
-
-impl RecordingAudit {
-    fn new(delta_m: Option<f64>) -> Self {
-        let settings = Settings::delta(delta_m.unwrap_or(NO_DELTA_M));
-        Self { auditor: TrackAuditor::new(settings).map(TrackAuditor::with_smallest) }
-    }
-
-    fn push(&mut self, names: &[String], items: &[Item]) {
-        if let Ok(auditor) = &mut self.auditor
-            && let Err(refused) = auditor.push(names, items)
-        {
-            self.auditor = Err(refused);
-        }
-    }
-
-    fn finish(self) -> Result<Outcome, RecordedError> {
-        self.auditor?.finish()
-    }
-}
 
 /// Returns the times of the closest approach, and of the smallest separations of the first violations \[s\].
 fn moments_s(judged: &Result<Outcome, RecordedError>) -> Vec<f64> {

@@ -7,12 +7,10 @@ use super::chart::Chart;
 use super::decimate::{MOST_INSTANTS, Span, around_worst, breaks, chosen, place_of_weightiest, present, shown};
 use super::motion::PackedMotion;
 use super::obstacle_meshes::{POINT_BYTES, Thing, ground};
-use super::stage::{Extent, Rotors, Targets, targets_of, turn_bytes};
+use super::stage::{Extent, LIMITS, Limits, Rotors, Targets, targets_of, turn_bytes};
 use super::statements::{self, Statement, Words};
 use super::viewpoint::Viewpoint;
-use super::{
-    Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles, singles,
-};
+use super::{Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles};
 use crate::figures::{Figure, at_closest};
 use crate::flight_log::FlightLog;
 use tautline_audit::MovingObstacle;
@@ -63,9 +61,10 @@ pub struct Replay {
 }
 
 /// Input of the script. Lists of numbers are base64 of their little-endian bytes.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct Data<'a> {
     version: u32,
+    limits: Limits,
     /// Names of the drawn vehicles.
     vehicles: Vec<String>,
     /// Drawn radius of each vehicle \[m\].
@@ -83,9 +82,9 @@ struct Data<'a> {
     /// First view, and whether it shows vehicles as lights.
     viewpoint: Viewpoint,
     lights: bool,
-    /// Side of the squares on the ground, and their lines relative to the origin, in single precision.
+    /// Side of the squares on the ground, and two corners of the ground relative to the origin \[m\].
     square_m: f64,
-    ground: String,
+    ground: [[f64; 3]; 2],
     /// Origin of the grid of positions, and its largest rounding error \[m\].
     middle_m: [f64; 3],
     cell_m: f64,
@@ -141,6 +140,12 @@ pub struct JudgementContext {
 }
 
 impl Replay {
+    /// Returns the JSON of a live view without vehicles, which its page fills.
+    pub(crate) fn empty_json() -> String {
+        let viewpoint = Viewpoint { azimuth_deg: -60.0, elevation_deg: 30.0, across: None };
+        written(&Data { version: VERSION, limits: LIMITS, decimals: 1, viewpoint, ..Data::default() })
+    }
+
     /// Packs a flight into at most `room_bytes` of JSON.
     ///
     /// If there are more than [`MOST_VEHICLES`](super::MOST_VEHICLES), or too many for the room, the vehicles of the
@@ -172,7 +177,7 @@ impl Replay {
         let extent = Extent::of(stage, log, &shown);
         let origin_m = place_of_weightiest(log, listed).unwrap_or(extent.middle_m());
         let level_m = stage.obstacles.iter().find_map(ground_m).unwrap_or(extent.low_m.z);
-        let (square_m, lines) = ground(extent.low_m, extent.high_m, level_m);
+        let (square_m, corners) = ground(extent.low_m, extent.high_m, level_m);
         let most_said = MOST_SAID.map(|most| (room_bytes / 10 / SAID_BYTES).clamp(8, most));
         let has_gaps =
             !judged.is_else_known || moments.iter().any(|of| matches!(of.kind, Kind::Undecided | Kind::Unseen));
@@ -181,10 +186,10 @@ impl Replay {
         let things = obstacle_meshes(stage, &extent, listed, room_bytes);
         let mut data = Data {
             version: VERSION,
+            limits: LIMITS,
             vehicles: shown.iter().map(|&k| cut(&stage.vehicles[k], LONGEST_NAME)).collect(),
             radius_m: shown.iter().map(|&k| stage.drawn_radius_m(k)).collect(),
             shell_m: stage.shell_m,
-            times_s: String::new(),
             decimals: decimals(end_s - begin_s),
             holds: log.holds,
             origin_m: origin_m.into(),
@@ -192,16 +197,9 @@ impl Replay {
             viewpoint: stage.viewpoint(log),
             lights: plan.as_ref().is_some_and(Plan::is_show),
             square_m,
-            ground: singles(&lines.iter().map(|at| at - origin_m).collect::<Vec<_>>()),
-            middle_m: [0.0; 3],
-            cell_m: 0.0,
-            rounding_m: 0.0,
+            ground: corners.map(|corner| (corner - origin_m).into()),
             points: shown.len() + guides.count(),
-            starts: String::new(),
-            steps: String::new(),
             rotors: stage.rotors,
-            turns: String::new(),
-            breaks: String::new(),
             near_s,
             near_who,
             nearest: statements::so_far(&nearest, &words, most_said[0]),
@@ -209,6 +207,7 @@ impl Replay {
             moments: in_order(listed).map(|moment| moment.data(&place)).collect(),
             things,
             targets,
+            ..Data::default()
         };
         // Breaks take a bounded share of the room. Beyond it, a vehicle that was absent in between is drawn at neither
         // end.

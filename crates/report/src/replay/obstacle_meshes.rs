@@ -164,31 +164,22 @@ impl Mesh {
     }
 }
 
-/// Returns the side and the lines of squares on the ground at a height \[m\], below everything between two corners
-/// \[m\]. The side is 1, 2 or 5 times a power of ten.
-pub(super) fn ground(low: Vector3<f64>, high: Vector3<f64>, height_m: f64) -> (f64, Vec<Vector3<f64>>) {
-    let rough = (0.5 * (high - low)).xy().amax() / SQUARES;
-    let mut ten = 1e-9;
-    while ten * 10.0 <= rough {
-        ten *= 10.0;
+/// Returns the side and two corners of the squares on the ground at a height \[m\], below everything between two
+/// corners \[m\].
+pub(super) fn ground(low: Vector3<f64>, high: Vector3<f64>, height_m: f64) -> (f64, [Vector3<f64>; 2]) {
+    let side_m = round_step((0.5 * (high - low)).xy().amax() / SQUARES);
+    let cells = [(low / side_m).map(|x| x.floor() - 1.0), (high / side_m).map(|x| x.ceil() + 1.0)];
+    (side_m, cells.map(|cells| Vector3::new(cells.x * side_m, cells.y * side_m, height_m)))
+}
+
+/// Returns the smallest of 1, 2 and 5 times a power of ten at or above a length; 1 for an invalid length.
+#[must_use]
+pub fn round_step(length_m: f64) -> f64 {
+    if !(length_m > 0.0 && length_m.is_finite()) {
+        return 1.0;
     }
-    let side_m =
-        [1.0, 2.0, 5.0, 10.0].map(|times| times * ten).into_iter().find(|&side_m| side_m >= rough).unwrap_or(ten);
-    let from = (low / side_m).map(f64::floor).map(|cells| cells - 1.0);
-    let to = (high / side_m).map(f64::ceil).map(|cells| cells + 1.0);
-    let mut lines = Vec::new();
-    for (across, along) in [(0, 1), (1, 0)] {
-        let mut cell = from[across];
-        while cell <= to[across] {
-            for end in [from, to] {
-                let mut at = Vector3::new(0.0, 0.0, height_m);
-                (at[across], at[along]) = (cell * side_m, end[along] * side_m);
-                lines.push(at);
-            }
-            cell += 1.0;
-        }
-    }
-    (side_m, lines)
+    let power = 10.0_f64.powf(length_m.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|&step| step >= length_m).unwrap_or(power)
 }
 
 #[cfg(test)]
@@ -258,10 +249,18 @@ mod tests {
     fn ground_squares_cover_the_box_in_moderate_number() {
         for reach_m in [1e-3, 0.7, 3.0, 49.0, 1e6] {
             let (low, high) = (Vector3::repeat(-reach_m), Vector3::new(reach_m, 0.5 * reach_m, 0.0));
-            let (side_m, lines) = ground(low, high, -1.0);
-            let most = lines.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |most, at| most.sup(at));
-            assert!(most.x >= high.x && most.y >= high.y && lines.iter().all(|at| at.z == -1.0));
-            assert!((10..60).contains(&(lines.len() / 2)), "{side_m} m: {} lines", lines.len() / 2);
+            let (side_m, [least, most]) = ground(low, high, -1.0);
+            assert!(most.x >= high.x && most.y >= high.y && least.x <= low.x && least.y <= low.y);
+            assert_eq!((least.z, most.z), (-1.0, -1.0));
+            let lines = ((most - least) / side_m).xy().add_scalar(1.0).sum();
+            assert!((10.0..60.0).contains(&lines), "{side_m} m: {lines} lines");
         }
+    }
+
+    #[test]
+    fn ground_steps_are_round_numbers() {
+        let steps = [0.9, 1.0, 1.1, 3.0, 7.0, 0.03, 1234.0].map(round_step);
+        assert_eq!(steps, [1.0, 1.0, 2.0, 5.0, 10.0, 0.05, 2000.0]);
+        assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(round_step), [1.0; 4]);
     }
 }

@@ -38,6 +38,45 @@ pub struct Rotors {
     pub radius_m: f64,
 }
 
+/// Distance of the rotors from the centre, and their radius, over the radius of the hull, for an unknown model.
+const ARM: f64 = 0.66;
+const ROTOR: f64 = 0.33;
+
+impl Rotors {
+    /// Returns the rotors of a scenario's model, if its vehicles are quadrotors.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Option<Self> {
+        let model = &scenario.airframe.quadrotor()?.model;
+        Some(Self { at_m: model.rotor_positions_m, radius_m: model.rotor_radius_m })
+    }
+
+    /// Creates four rotors within a hull of this radius \[m\].
+    #[must_use]
+    pub fn within(hull_radius_m: f64) -> Self {
+        let out = hull_radius_m * ARM * std::f64::consts::FRAC_1_SQRT_2;
+        let at_m = [[1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]].map(|at: [f64; 2]| at.map(|side| side * out));
+        Self { at_m, radius_m: hull_radius_m * ROTOR }
+    }
+
+    /// Returns the rotors at another scale.
+    #[must_use]
+    pub fn scaled(&self, scale: f64) -> Self {
+        Self { at_m: self.at_m.map(|at| at.map(|side| side * scale)), radius_m: self.radius_m * scale }
+    }
+
+    /// Returns the centres of the rotors at a height above the centre of the body \[m\].
+    #[must_use]
+    pub fn places_m(&self, above_m: f64) -> [Vector3<f64>; 4] {
+        self.at_m.map(|[x, y]| Vector3::new(x, y, above_m))
+    }
+
+    /// Returns the distance of the outermost rotor from the centre \[m\].
+    #[must_use]
+    pub fn arm_m(&self) -> f64 {
+        self.places_m(0.0).iter().map(Vector3::norm).fold(0.0, f64::max)
+    }
+}
+
 /// Returns the attitudes of some vehicles as three signed bytes each: the vector part of the quaternion with a positive
 /// scalar part, times 127. A vehicle with unknown attitude is upright.
 pub(super) fn turn_bytes(attitudes: &[Option<UnitQuaternion<f64>>], shown: &[usize]) -> Vec<u8> {
@@ -93,10 +132,7 @@ impl Stage {
             radius_m: scenario.hull_radius_m.iter().copied().map(Some).collect(),
             shell_m: Some(scenario.half_axes_m().unwrap_or([0.5 * scenario.delta_m; 3])),
             plan: Some(Plan::of(scenario)),
-            rotors: scenario
-                .airframe
-                .quadrotor()
-                .map(|of| Rotors { at_m: of.model.rotor_positions_m, radius_m: of.model.rotor_radius_m }),
+            rotors: Rotors::of(scenario),
             obstacles: scenario.obstacles.iter().map(MovingObstacle::from).collect(),
         }
     }
@@ -163,7 +199,27 @@ fn boxes(obstacle: &MovingObstacle) -> Vec<(Vector3<f64>, Vector3<f64>)> {
 }
 
 /// Largest number of drawn links. More links would hide each other.
-const MOST_LINKS: usize = 2100;
+pub const MOST_LINKS: usize = 2100;
+
+/// Numbers up to which parts of a drawing are shown. More would hide the formation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Limits {
+    /// Vehicles that all have names. Of more, only important ones have.
+    pub named: usize,
+    /// Vehicles with trails of the whole flight, and with trails of 5 s. More have trails of 1 s.
+    pub trails: [usize; 2],
+    /// Vehicles with lines to the ground.
+    pub drops: usize,
+    /// Vehicles with slots at first.
+    pub slots: usize,
+    /// Links that are shown at first.
+    pub links: usize,
+    /// Vehicles with colours of their own. More have one colour.
+    pub colours: usize,
+}
+
+/// Limits of pictures and replays.
+pub const LIMITS: Limits = Limits { named: 24, trails: [24, 99], drops: 300, slots: 60, links: 40, colours: 199 };
 
 /// Links of the graph, and the slots of the vehicles.
 #[derive(Clone, Debug, Default, Serialize)]

@@ -31,7 +31,7 @@ const HALF_TURN: f64 = 0.1;
 const EYE: f64 = 3.0;
 
 /// Direction from which a flight is seen first.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Viewpoint {
     /// Azimuth of the oblique view, from the x axis towards the y axis \[degrees\].
     pub azimuth_deg: f64,
@@ -69,16 +69,20 @@ impl Viewpoint {
             });
             hidden.iter().sum::<f64>() + HALF_TURN * turn_deg.abs() / 180.0
         };
-        // From small turns to large ones, so that the first of equal costs is the nearest.
-        let step_deg = 360.0 / f64::from(AZIMUTHS);
-        let turns = (0..=AZIMUTHS / 2).flat_map(|k| [1.0, -1.0].map(|sign| sign * step_deg * f64::from(k)));
-        let costs =
-            turns.take(if solid.is_empty() { 1 } else { usize::MAX }).map(|turn_deg| (cost(turn_deg), turn_deg));
+        // The first of equal costs is the nearest.
+        let costs = turns_deg().take(if solid.is_empty() { 1 } else { usize::MAX });
+        let costs = costs.map(|turn_deg| (cost(turn_deg), turn_deg));
         let turn_deg = costs.reduce(|best, next| if next.0 < best.0 { next } else { best }).map_or(0.0, |best| best.1);
         let azimuth_deg = usual_deg + turn_deg;
         let azimuth_deg = azimuth_deg - 360.0 * (azimuth_deg / 360.0).round();
         Self { azimuth_deg, elevation_deg, across: [2, 1, 0].into_iter().find(is_thin) }
     }
+}
+
+/// Returns angles by which a view may turn, from small to large \[degrees\].
+pub fn turns_deg() -> impl Iterator<Item = f64> {
+    let step_deg = 360.0 / f64::from(AZIMUTHS);
+    (0..=AZIMUTHS / 2).flat_map(move |k| [1.0, -1.0].map(|sign| sign * step_deg * f64::from(k)))
 }
 
 /// Returns the unit vector from a target to an eye in this direction.

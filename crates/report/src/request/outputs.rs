@@ -19,7 +19,7 @@ const STANDARD_OUTPUT: &str = "-";
 /// File with its name in messages: an option, or words such as `the recording`.
 pub type NamedPath<'a> = (String, &'a Path);
 
-/// Rejects `-`, and outputs that would overwrite an input or each other, or become part of an input folder of CSV files.
+/// Rejects `-`, and outputs that would overwrite an input or each other, or become part of an input folder of CSVs.
 ///
 /// # Errors
 /// [`Failure`] that names both files.

@@ -290,7 +290,10 @@ fn given_states_are_starts() {
         assert!(matches!(refused, VectorError::Seed { world: 1, .. }), "{refused}");
         positions_m[15] = f64::NAN;
         assert!(reset(&positions_m, &mut states).is_err());
-        assert!(matches!(reset(&positions_m[..29], &mut states), Err(VectorError::Length { expected: 30, found: 29, .. })));
+        assert!(matches!(
+            reset(&positions_m[..29], &mut states),
+            Err(VectorError::Length { expected: 30, found: 29, .. })
+        ));
         assert_eq!(states, before, "a refused reset changes nothing");
     }
 }

@@ -3,6 +3,7 @@
 use maud::{DOCTYPE, PreEscaped, html};
 
 use super::{POLICY, STYLE, metadata, replay, theme_choice};
+use crate::replay::Replay;
 
 /// Rules of the band with the state, and of the lists.
 const LIVE_STYLE: &str = include_str!("live.css");
@@ -40,7 +41,9 @@ pub fn live_page() -> String {
                         h2 { "Positions" }
                         p.about { "The newest positions, with trails of the last 20 s." }
                         p #absent { "No vehicle is heard." }
-                        div.replay data-label="the watch" data-start="later" { script type="application/json" {} }
+                        div.replay data-label="the watch" data-start="later" {
+                            script type="application/json" { (PreEscaped(Replay::empty_json())) }
+                        }
                     }
                     section {
                         h2 { "Closest pairs" }

@@ -48,9 +48,9 @@
 //! it: they are evidence that comes one step late, not the verdict.
 //!
 //! # Free steps
-//! While every pair, and every vehicle and obstacle, is farther apart than the contacts of the engine reach, the plants
-//! can do the operations of the engine for a body without contacts. Vector simulations, studies and `tautline run
-//! --free-steps` leave the engine out of these steps. Except in vector simulations, the engine repeats each eighth of
+//! While all distances of pairs, and to obstacles, are beyond the reach of contacts, the plants can do the operations
+//! of the engine for a body without contacts. Vector simulations, studies and `tautline run --free-steps` leave the
+//! engine out of these steps. Except in vector simulations, the engine repeats each eighth of
 //! them, and any difference is an error. In all other flights the engine makes every step.
 //!
 //! In vector simulations keep-out balls may overlap in a free step: they change no motion, and the plants report the
