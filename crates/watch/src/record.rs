@@ -176,7 +176,8 @@ mod tests {
             record.push(0.0, &pose).expect("a row");
         }
         record.finish().expect("a file");
-        let tracks = open(&path, &ReadOptions::default()).expect("a recording");
+        let mut tracks = open(&path, &ReadOptions::default()).expect("a recording");
+        while tracks.read(&mut Vec::new()).expect("rows") {}
         assert_eq!(tracks.vehicles(), ["cf1", "CF1"]);
     }
 }

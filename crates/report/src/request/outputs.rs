@@ -271,7 +271,7 @@ mod tests {
         assert_eq!(clash(&[], &[("--out", dash)]).as_deref(), Some("--out: cannot go to standard output"));
         assert_eq!(clash(&[], &[("--out", Path::new("./-"))]), None);
         let refused = OutFolder::at("-", "run", "report.json").open(true).expect_err("no folder");
-        assert_eq!(refused.message(), "--out: cannot go to standard output");
+        assert_eq!(refused.message(), format!("{OUT}: cannot go to standard output"));
         assert!(!dash.exists());
     }
 
