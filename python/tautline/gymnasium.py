@@ -235,7 +235,7 @@ class FormationEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
     def _info(self, is_over: bool) -> Info:
         return first_of(self.sim.info(np.array([is_over])))
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Returns a picture (height, width, 3), or shows it in a window."""
         if self.render_mode is None:
             return None

@@ -121,12 +121,12 @@ def episode_seed(seed: int, world: int, episode: int) -> int:
 
 
 def starts_of(options: Mapping[str, Any] | None) -> dict[str, ArrayLike]:
-    """Returns the starts among the options of a reset. Raises :class:`Error` for an unknown option."""
+    """Returns the starts among the options of a reset. The options of others are ignored, as Gymnasium asks for."""
     names = {"positions_m": "positions", "velocities_m_s": "velocities"}
-    given = {key: value for key, value in (options or {}).items() if key != "reset_mask" and value is not None}
-    if unknown := [key for key in given if key not in names]:
-        raise Error(f"options: unknown option {unknown[0]}; give {', '.join([*names, 'reset_mask'])}")
-    return {names[key]: value for key, value in given.items()}
+    given = {key: value for key, value in (options or {}).items() if value is not None}
+    if misspelt := [key for key in given if key not in names and str(key).startswith(("position", "velocit"))]:
+        raise Error(f"options: unknown option {misspelt[0]}; give {' and '.join(names)}")
+    return {names[key]: value for key, value in given.items() if key in names}
 
 
 class Observes(Protocol):

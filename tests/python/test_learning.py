@@ -221,11 +221,11 @@ class Gymnasium(Case):
             "leg": [{"shape": "circle", "radius_m": 6.0, "start_s": 1.0}],
             "reference": {"kind": "velocity", "velocity_m_s": [1.0, 0.0]},
         }
-        env = FormationVectorEnv("pentagon", 1, set=sets)
+        env = FormationVectorEnv("swap", 1, set=sets)
         observations, _ = env.reset(seed=0)
         before = env.sim.slots_m
         for _ in range(30):
-            observations, rewards, *_ = env.step(np.zeros((1, 5, 2)))
+            observations, rewards, *_ = env.step(np.zeros((1, 12, 2)))
         after = env.sim.slots_m
         self.assertGreater(np.linalg.norm(after - before, axis=-1).min(), 0.5)
         np.testing.assert_allclose(after[0, :, :2].mean(0), [1.5, 0.0], atol=1e-9)
@@ -260,8 +260,9 @@ class Gymnasium(Case):
         env = FormationVectorEnv("obstacles", 1, set={"leg": []})
         observations, _ = env.reset(seed=0)
         nearest = env.sim.to_obstacles()
-        self.assertEqual(observations.shape[2], 2 * (len(env.sim.scenario) + 1) + 2 * nearest.shape[2])
-        np.testing.assert_allclose(observations[0, :, -2:], nearest[0, :, -1, :2], atol=1e-5)
+        axes = env.sim.axes
+        self.assertEqual(observations.shape[2], axes * (len(env.sim.scenario) + 1 + nearest.shape[2]))
+        np.testing.assert_allclose(observations[0, :, -axes:], nearest[0, :, -1, :axes], atol=1e-5)
         least_m = np.linalg.norm(nearest, axis=-1).min()
         self.assertGreater(least_m, env.sim.least_clearance_m[0] - 1e-9)
 

@@ -179,7 +179,7 @@ fn commands_from_outside_pass_through_shield_and_actuators() {
             Simulation::new(&Scenario { actuation: ActuationSpec::default(), shield: None, ..scenario.clone() })
                 .expect("one");
         // At the end, both have commanded at the same instants of the shield.
-        for _ in 0..905 {
+        for _ in 0..903 {
             by_law.step();
             by_hand.step_with(&commands).expect("finite commands");
             exact.step_with(&commands).expect("finite commands");
@@ -203,9 +203,9 @@ fn a_shield_takes_commands_at_its_own_instants_only() {
     by_law.step();
     assert_eq!(mixed.state(), by_law.state());
     for _ in 0..16 {
-        (0..4).for_each(|_| mixed.step_with(&commands).expect("finite commands"));
+        (0..6).for_each(|_| mixed.step_with(&commands).expect("finite commands"));
         mixed.step();
-        (0..5).for_each(|_| by_law.step());
+        (0..7).for_each(|_| by_law.step());
     }
     assert_ne!(mixed.state(), by_law.state());
     let (mixed, by_law) = (mixed.finish(), by_law.finish());

@@ -302,7 +302,7 @@ fn given_states_are_starts() {
 fn slots_follow_the_reference_and_measurements_have_noise() {
     let noise = "sensing={position_noise_m=0.1, rate_hz=100}";
     let sets = [noise, "start.jitter_m=0.1", "reference={kind=\"velocity\", velocity_m_s=[1, 0]}"];
-    let mut worlds = VectorSimulation::new(template("pentagon", &sets), &[1, 2], Threads::One).expect("worlds");
+    let mut worlds = VectorSimulation::new(template("swap", &sets), &[1, 2], Threads::One).expect("worlds");
     let mut states = States::of(&worlds);
     let numbers = states.positions_m.len();
     let [mut first, mut later, mut measured_m, mut measured_m_s] = [(); 4].map(|()| vec![0.0; numbers]);
