@@ -58,8 +58,10 @@ class Picture:
         if self.extent is not None:
             low, high = np.minimum(low, self.extent[0]), np.maximum(high, self.extent[1])
         self.extent = np.array([low, high])
-        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]", aspect="equal")
-        ax.set_adjustable("datalim")
+        # A square frame has the scale of both axes.
+        (x, y), half = (low + high) / 2, (high - low).max() / 2
+        ax.set(xlim=(x - half, x + half), ylim=(y - half, y + half), xlabel="x [m]", ylabel="y [m]")
+        ax.set_aspect("equal")
         clearance_m = worlds.least_clearance_m[world]
         ax.set_title(f"{worlds.t[world]:.2f} s, smallest clearance {clearance_m:.3f} m", fontsize=10)
         if self.is_shown:

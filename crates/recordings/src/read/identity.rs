@@ -139,7 +139,7 @@ impl Names {
 }
 
 fn refuse_twice<T>(first: &str, second: &str) -> Result<T, Fault> {
-    let [first, second] = [first, second].map(|name| quoted(name));
+    let [first, second] = [first, second].map(quoted);
     let problem = if first == second {
         format!("two vehicles have the name {first}")
     } else {

@@ -27,6 +27,8 @@ pub(super) struct Controller {
     metric: Metric,
     near: VerletList,
     pub(super) shield: Option<ShieldStage>,
+    /// Whether the shield has no command at the present instant of command yet.
+    pub(super) awaits_command: bool,
     /// Last command of the law or from outside, as the shield changed it, N x 3 \[m/s^2\].
     commanded: Rows,
 }
@@ -44,7 +46,20 @@ impl Controller {
         let commanded = Rows::zeros(scenario.count());
         let metric = scenario.metric();
         let shield = ShieldStage::of(scenario)?;
-        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, metric, near, shield, commanded })
+        Ok(Self {
+            law,
+            link,
+            supervisor,
+            target,
+            guidance,
+            links,
+            obstacles,
+            metric,
+            near,
+            shield,
+            awaits_command: false,
+            commanded,
+        })
     }
 
     /// Senses at an instant of the flight, lets the supervisor change the target, and writes the law's command if

@@ -52,8 +52,6 @@ pub struct Simulation {
     control: Rows,
     /// Whether `control` is from outside and the law has not been evaluated for the present state.
     overruled: bool,
-    /// Whether a shield has no command at the present instant of command yet.
-    awaits_command: bool,
     time_s: f64,
     steps: u64,
     events: Vec<Event>,
@@ -139,7 +137,6 @@ impl Simulation {
             path: StepPath::default(),
             control: Rows::zeros(count),
             overruled: awaits_command,
-            awaits_command,
             state,
             time_s: 0.0,
             steps: 0,
@@ -185,7 +182,7 @@ impl Simulation {
     pub fn step(&mut self) {
         if self.ending.is_none() && std::mem::take(&mut self.overruled) {
             // A shield keeps its command until its next instant.
-            if std::mem::take(&mut self.awaits_command) || self.controller.shield.is_none() {
+            if std::mem::take(&mut self.controller.awaits_command) || self.controller.shield.is_none() {
                 let asked = self.evaluate_law();
                 self.end_if_over(asked);
             }
@@ -221,7 +218,7 @@ impl Simulation {
     /// Applies accelerations from outside at the present instant, after the shield if there is one.
     fn take_commands(&mut self, commands: &Rows) -> Result<(), Ending> {
         let is_shielded = self.controller.shield.is_some();
-        if is_shielded && !std::mem::take(&mut self.awaits_command) {
+        if is_shielded && !std::mem::take(&mut self.controller.awaits_command) {
             return Ok(());
         }
         if !is_shielded && !self.certificate.void.contains(&VoidReason::ExternalCommands) {

@@ -121,16 +121,13 @@ impl Proximity {
     pub(super) fn begin_step(&mut self, positions_m: &Rows) -> Maker {
         let allowed = self.free;
         let free = allowed.filter(|_| self.is_free(positions_m));
-        let maker = match free {
-            Some(free) => {
-                self.unseen = (self.unseen + 1) % COMPARED_EACH;
-                if free == FreeSteps::Compared && self.unseen == 0 { Maker::Both } else { Maker::FreeStep }
-            }
-            None => {
-                // Contacts may move vehicles farther than their velocities do.
-                self.forget();
-                Maker::Engine
-            }
+        let maker = if let Some(free) = free {
+            self.unseen = (self.unseen + 1) % COMPARED_EACH;
+            if free == FreeSteps::Compared && self.unseen == 0 { Maker::Both } else { Maker::FreeStep }
+        } else {
+            // Contacts may move vehicles farther than their velocities do.
+            self.forget();
+            Maker::Engine
         };
         self.engine_steps += u64::from(maker != Maker::FreeStep);
         maker

@@ -213,7 +213,7 @@ impl Simulation {
         let time = &self.scenario.time;
         let is_instant = time.control_hz.is_none() || (is_whole && time.commands(number));
         let is_asked = !self.overruled && is_instant;
-        self.awaits_command = self.overruled && is_instant && self.controller.shield.is_some();
+        self.controller.awaits_command = self.overruled && is_instant && self.controller.shield.is_some();
         if time.control_hz.is_some() || (self.overruled && !self.controller.link.is_exact()) {
             if step.is_some() {
                 self.controller.actuate(self.time_s, &mut self.control);
