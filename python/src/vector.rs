@@ -288,7 +288,7 @@ impl VectorSimulation {
     /// (E, N, N, 3) positions [m] of vehicle j that vehicle i last received; NaN without a link.
     fn received<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<f64>>> {
         let [worlds, vehicles] = self.shape;
-        self.written(py, [worlds, vehicles, vehicles, 3], |worlds, received_m| worlds.write_received(received_m))
+        self.written(py, [worlds, vehicles, vehicles, 3], sim::VectorSimulation::write_received)
     }
 
     /// (E, N, K, 3) vectors from each vehicle to the nearest point of each of K obstacles [m].
