@@ -578,7 +578,7 @@ impl VectorSimulation {
         });
         let pairs = vehicles.flat_map(|position_m| obstacles.iter().map(move |obstacle| (position_m, obstacle)));
         for ((position_m, obstacle), vector_m) in pairs.zip(vectors_m.chunks_exact_mut(3)) {
-            let (distance_m, away) = signed_distance_m(&obstacle.shape, position_m);
+            let (distance_m, away) = signed_distance_m(&obstacle.shape, position_m - obstacle.place_m);
             vector_m.copy_from_slice((-distance_m * away).as_slice());
         }
         Ok(())
