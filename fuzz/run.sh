@@ -15,7 +15,9 @@ if [ -z "$seconds" ]; then
     seconds=3 seed=1
     rm -rf "$corpus"
 fi
-TAUTLINE_FUZZ_CORPUS=$corpus/readers cargo test --quiet --package tautline-recordings --test recordings every_format_has
+# A selection of one package alone would compile its dependencies with other features again.
+TAUTLINE_FUZZ_CORPUS=$corpus/readers cargo test --quiet --workspace --exclude tautline-python --exclude tautline-fuzz \
+    --test recordings every_format_has
 mkdir -p "$corpus/readers/scenario"
 cp assets/*.toml "$corpus/readers/scenario/"
 
