@@ -8,19 +8,57 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._display import PATHS
+from ._native import Error
 from .learning import Worlds
 
 #: Sides of a picture [inch], and pixels per inch.
 SIDES, DPI = (4.8, 4.8), 100
 
 
+#: Modes of rendering.
+RENDER_MODES = ["rgb_array", "human"]
+
+
+def checked_mode(given: str | None) -> str | None:
+    """Returns a known mode of rendering. Raises :class:`Error` for another one."""
+    if given is not None and given not in RENDER_MODES:
+        raise Error(f"render_mode: must be {' or '.join(RENDER_MODES)}, got {given!r}")
+    return given
+
+
+class Rendered:
+    """Rendering of an environment with one world."""
+
+    sim: Worlds
+    render_mode: str | None
+    _picture: Picture | None = None
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Returns a picture (height, width, 3), or shows it in a window. It needs matplotlib."""
+        if self.render_mode is None:
+            return None
+        self._picture = self._picture or Picture(self.render_mode == "human")
+        return self._picture.draw(self.sim, 0)
+
+    def _show(self) -> None:
+        """Shows the present state, if there is a window."""
+        if self.render_mode == "human":
+            self.render()
+
+    def close(self) -> None:
+        """Closes the window."""
+        if self._picture is not None:
+            self._picture.close()
+        self._picture = None
+
+
 class Picture:
     """Draws worlds: each vehicle as a ball of the diameter delta, its slot as a cross.
 
-    Needs matplotlib. All pictures of a world have the frame of its first one, widened to what is shown.
+    It needs matplotlib. The frame of a picture is that of the last one, widened where vehicles or slots lie outside.
     """
 
-    def __init__(self, worlds: Worlds, is_shown: bool) -> None:
+    def __init__(self, is_shown: bool) -> None:
         if is_shown:
             from matplotlib import pyplot
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ._arguments import PathLike
 from ._native import Error
-from ._picture import Picture
+from ._picture import RENDER_MODES, Picture, Rendered, checked_mode
 from ._scenario import Scenario
 from .learning import VIOLATION, Actions, Observes, Reward, Rewards, Worlds, checked, first_of, observations_of
 
@@ -32,9 +32,6 @@ __all__ = ["VIOLATION", "FormationEnv", "FormationVectorEnv"]
 
 Observations = NDArray[np.float32]
 Info = dict[str, Any]
-
-RENDER_MODES = ["rgb_array", "human"]
-
 
 class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """Worlds of a scenario in which vehicles fly to their slots, stepped together.
@@ -82,7 +79,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             "render_fps": max(1, round(self.actions.hz)),
             "autoreset_mode": self.autoreset_mode,
         }
-        self.render_mode = _render_mode(render_mode)
+        self.render_mode = checked_mode(render_mode)
         count, axes = len(self.sim.scenario), self.sim.axes
         self._shape = (self.num_envs, count, axes)
         self.single_observation_space = Box(-np.inf, np.inf, shape=(count, observed), dtype=np.float32)
@@ -166,7 +163,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             return None
         if not self._pictures:
             shown = self.render_mode == "human"
-            self._pictures = [Picture(self.sim, shown) for _ in range(1 if shown else self.num_envs)]
+            self._pictures = [Picture(shown) for _ in range(1 if shown else self.num_envs)]
         drawn = [picture.draw(self.sim, world) for world, picture in enumerate(self._pictures)]
         return None if self.render_mode == "human" else tuple(picture for picture in drawn if picture is not None)
 
@@ -177,7 +174,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self._pictures = []
 
 
-class FormationEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
+class FormationEnv(Rendered, gymnasium.Env[Observations, NDArray[np.float32]]):
     """One world of :class:`FormationVectorEnv`, for programs that take a single environment. Actions are (N, D)."""
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 20}
@@ -199,11 +196,10 @@ class FormationEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
         self.observe, observed = observations_of(observe, self.sim)
         self.reward: Rewards = Reward() if reward is None else reward
         self.metadata = {**self.metadata, "render_fps": max(1, round(self.actions.hz))}
-        self.render_mode = _render_mode(render_mode)
+        self.render_mode = checked_mode(render_mode)
         self._shape = (len(self.sim.scenario), self.sim.axes)
         self.observation_space = Box(-np.inf, np.inf, shape=(self._shape[0], observed), dtype=np.float32)
         self.action_space = Box(-1.0, 1.0, shape=self._shape, dtype=np.float32)
-        self._picture: Picture | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -234,30 +230,6 @@ class FormationEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
 
     def _info(self, is_over: bool) -> Info:
         return first_of(self.sim.info(np.array([is_over])))
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Returns a picture (height, width, 3), or shows it in a window."""
-        if self.render_mode is None:
-            return None
-        self._picture = self._picture or Picture(self.sim, self.render_mode == "human")
-        return self._picture.draw(self.sim, 0)
-
-    def _show(self) -> None:
-        if self.render_mode == "human":
-            self.render()
-
-    def close(self) -> None:
-        """Closes the window."""
-        if self._picture is not None:
-            self._picture.close()
-        self._picture = None
-
-
-def _render_mode(given: str | None) -> str | None:
-    """Returns a known mode."""
-    if given is not None and given not in RENDER_MODES:
-        raise Error(f"render_mode: must be {' or '.join(RENDER_MODES)}, got {given!r}")
-    return given
 
 
 if "tautline/Formation-v0" not in gymnasium.registry:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ._arguments import PathLike
 from ._native import Error
-from ._picture import Picture
+from ._picture import RENDER_MODES, Rendered, checked_mode
 from ._scenario import Scenario
 from .learning import VIOLATION, Actions, Observes, Reward, Rewards, Worlds, checked, first_of, observations_of
 
@@ -29,10 +29,7 @@ __all__ = ["VIOLATION", "FormationEnv"]
 Arrays = dict[str, NDArray[np.float32]]
 
 
-RENDER_MODES = ["rgb_array", "human"]
-
-
-class FormationEnv(ParallelEnv):  # type: ignore[misc]
+class FormationEnv(Rendered, ParallelEnv):  # type: ignore[misc]
     """A world of a scenario in which each vehicle flies to its slot.
 
     The action of an agent (D,), from -1 to 1 along each axis, is a share of ``max_accel_m_s2``, held for ``1 / hz``
@@ -57,8 +54,6 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         set: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode is not None and render_mode not in RENDER_MODES:
-            raise Error(f"render_mode: must be {' or '.join(RENDER_MODES)}, got {render_mode!r}")
         self.sim = Worlds(scenario, 1, threads=1, shield=shield, set=set)
         self._actions = Actions(self.sim, hz, max_accel_m_s2)
         self.observe, observed = observations_of(observe, self.sim)
@@ -68,7 +63,7 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
             "render_modes": RENDER_MODES,
             "render_fps": max(1, round(self._actions.hz)),
         }
-        self.render_mode = render_mode
+        self.render_mode = checked_mode(render_mode)
         self._shape = (len(self.sim.scenario), self.sim.axes)
         self.possible_agents = [f"vehicle_{number}" for number in range(1, self._shape[0] + 1)]
         self.agents: list[str] = []
@@ -79,7 +74,6 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         #: Space of :meth:`state`.
         self.state_space = Box(-np.inf, np.inf, shape=(self._shape[0], 3 * self._shape[1]), dtype=np.float32)
         self._observed = observed
-        self._picture: Picture | None = None
 
     def observation_space(self, agent: str) -> Box:
         """Returns the space of an agent's observations."""
@@ -143,20 +137,3 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
     def _infos(self, is_over: bool) -> dict[str, dict[str, Any]]:
         info = first_of(self.sim.info(np.array([is_over])))
         return {agent: dict(info) for agent in self.possible_agents}
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Returns a picture (height, width, 3), or shows it in a window. It needs matplotlib."""
-        if self.render_mode is None:
-            return None
-        self._picture = self._picture or Picture(self.sim, self.render_mode == "human")
-        return self._picture.draw(self.sim, 0)
-
-    def _show(self) -> None:
-        if self.render_mode == "human":
-            self.render()
-
-    def close(self) -> None:
-        """Closes the window."""
-        if self._picture is not None:
-            self._picture.close()
-        self._picture = None

@@ -268,8 +268,8 @@ mod tests {
     #[test]
     fn standard_output_is_refused_where_a_file_or_folder_is_written() {
         let dash = Path::new("-");
-        assert_eq!(clash(&[], &[("--out", dash)]).as_deref(), Some("--out: cannot go to standard output"));
-        assert_eq!(clash(&[], &[("--out", Path::new("./-"))]), None);
+        assert_eq!(clash(&[], &[("film", dash)]).as_deref(), Some("film: cannot go to standard output"));
+        assert_eq!(clash(&[], &[("film", Path::new("./-"))]), None);
         let refused = OutFolder::at("-", "run", "report.json").open(true).expect_err("no folder");
         assert_eq!(refused.message(), format!("{OUT}: cannot go to standard output"));
         assert!(!dash.exists());

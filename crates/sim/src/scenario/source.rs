@@ -101,7 +101,7 @@ impl Scenario {
     /// TOML; a key is unknown, missing or of the wrong type; the scenario is invalid (see [`Scenario::validate`]).
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
-        Text { name: &name, toml: &text, overrides }.read(|text| finish(decoded(text, source.folder())?, text))
+        Text { name: &name, toml: &text, overrides }.read(|text| finish(decoded(text, source.folder())?, text, None))
     }
 }
 
@@ -113,14 +113,18 @@ pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, Scenar
     Ok(document)
 }
 
-/// Builds and validates the scenario of a document.
-pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario, ScenarioError> {
+/// Builds and validates the scenario of a document. `valid` is another scenario of the same file, if one is known.
+pub(super) fn finish(
+    mut document: Document,
+    text: &Text<'_>,
+    valid: Option<&Scenario>,
+) -> Result<Scenario, ScenarioError> {
     let stem = || Path::new(text.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     document.name = document.name.or_else(|| Some(as_name(&stem())));
     template::check_laws(&document.laws).map_err(|(law, error)| text.place_in_law(law, error))?;
     let jitter_m = document.start.jitter_m;
     let scenario = build::scenario(document).map_err(|error| text.place(error))?;
-    scenario.check_built().map_err(|error| text.place(error.with_jitter(jitter_m)))?;
+    scenario.check_built(valid).map_err(|error| text.place(error.with_jitter(jitter_m)))?;
     Ok(scenario)
 }
 

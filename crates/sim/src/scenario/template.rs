@@ -85,7 +85,7 @@ impl Template {
             let named = document.laws.iter();
             let laws = named.map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s))).collect();
             let start_is_random = is_random(&document);
-            Ok((document.clone(), finish(document, text)?, start_is_random, laws))
+            Ok((document.clone(), finish(document, text, None)?, start_is_random, laws))
         })?;
         Ok(Self { document, own, start_is_random, laws, overrides: overrides.to_vec(), name, toml })
     }
@@ -186,7 +186,7 @@ impl Template {
             document.noise.seed = draw.seed;
         }
         document.start.jitter_m = draw.jitter_m.unwrap_or(document.start.jitter_m);
-        Ok(Scenario { external_law: self.own.external_law.clone(), ..finish(document, &text)? })
+        Ok(Scenario { external_law: self.own.external_law.clone(), ..finish(document, &text, Some(&self.own))? })
     }
 }
 
