@@ -415,7 +415,9 @@ fn copied<T: Element + Copy + Into<f64>>(given: &Bound<'_, PyAny>) -> PyResult<V
 fn raised(error: VectorError) -> PyErr {
     let text = error.to_string();
     match error {
-        VectorError::Seed { why, .. } | VectorError::NoSeed { why, .. } => wrong_input_with_code(why.code(), text),
+        VectorError::Seed { why, .. } | VectorError::Start { why, .. } | VectorError::NoSeed { why, .. } => {
+            wrong_input_with_code(why.code(), text)
+        }
         VectorError::Sim(why) => why.into_exception(),
         _ => wrong_input(text),
     }

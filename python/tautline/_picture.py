@@ -64,11 +64,9 @@ class Picture:
 
             self.figure: Any = pyplot.figure(figsize=SIDES, dpi=DPI)
         else:
-            from matplotlib.backends.backend_agg import FigureCanvasAgg
             from matplotlib.figure import Figure
 
             self.figure = Figure(figsize=SIDES, dpi=DPI)
-            FigureCanvasAgg(self.figure)
         self.is_shown = is_shown
         self.axes = self.figure.add_axes((0.1, 0.08, 0.86, 0.84))
         self.extent: NDArray[np.float64] | None = None
@@ -108,8 +106,12 @@ class Picture:
             self.figure.canvas.draw_idle()
             pyplot.pause(1e-3)
             return None
-        self.figure.canvas.draw()
-        return np.array(self.figure.canvas.buffer_rgba())[..., :3].copy()
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        # A copy of a figure has no canvas of its own.
+        canvas = FigureCanvasAgg(self.figure)
+        canvas.draw()
+        return np.array(canvas.buffer_rgba())[..., :3].copy()
 
     def close(self) -> None:
         """Closes the window."""

@@ -168,8 +168,9 @@ class VectorSimulation:
         return positions, velocities
 
     def received(self) -> NDArray[np.float64]:
-        """Returns positions [m] (E, N, N, 3): ``[e, i, j]`` is the last one that vehicle i received from vehicle j, and
-        its own measured one for i = j. It is NaN without a link."""
+        """Returns positions [m] (E, N, N, 3): ``[e, i, j]`` is the position of vehicle j as vehicle i knows it from
+        messages, held or extrapolated as ``network`` says, and its own measured one for i = j. It is NaN without a
+        link."""
         return self._native.received()
 
     def to_obstacles(self) -> NDArray[np.float64]:

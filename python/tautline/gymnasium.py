@@ -96,19 +96,19 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         """Resets all episodes, or those with ``options["reset_mask"]`` (E,).
 
         With ``seed``, world e begins the episodes of ``(seed, e)`` anew, with ``seed[e]`` those of ``(seed[e], 0)``.
-        Without a seed, or with None in the list, a world begins its next episode; the first seed is random.
+        Without a seed, or with None in the list, a world begins its next episode; the first seed is random. Worlds
+        outside of the mask keep their seeds.
         ``options["positions_m"]`` and ``options["velocities_m_s"]`` are starts (E, N, 3), or of one world.
         """
         mask = np.ones(self.num_envs, dtype=np.bool_)
         if options is not None and options.get("reset_mask") is not None:
             mask = options["reset_mask"]
+        self.sim.begin(mask, options, seed)
         if isinstance(seed, (int, np.integer)):
             super().reset(seed=int(seed))
-        if seed is not None:
-            self.sim.seed(seed)
-        self.sim.begin(mask, options)
         self._is_begun = True
         self._done[mask] = False
+        self._show()
         return self._observe(), self._info(np.zeros_like(self._done))
 
     def step(
@@ -135,6 +135,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         observations, info = self._observe(), self._info(self._done)
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._done.any():
             observations, info = self._restart(observations, info)
+        self._show()
         return observations, rewards, terminated, truncated, info
 
     def _restart(self, final: Observations, final_info: Info) -> tuple[Observations, Info]:
@@ -166,6 +167,11 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             self._pictures = [Picture(shown) for _ in range(1 if shown else self.num_envs)]
         drawn = [picture.draw(self.sim, world) for world, picture in enumerate(self._pictures)]
         return None if self.render_mode == "human" else tuple(picture for picture in drawn if picture is not None)
+
+    def _show(self) -> None:
+        """Shows the present state, if there is a window."""
+        if self.render_mode == "human":
+            self.render()
 
     def close_extras(self, **kwargs: Any) -> None:
         """Closes the window."""
@@ -208,10 +214,8 @@ class FormationEnv(Rendered, gymnasium.Env[Observations, NDArray[np.float32]]):
 
         ``options["positions_m"]`` and ``options["velocities_m_s"]`` are a start (N, 3).
         """
+        self.sim.begin(np.ones(1, dtype=np.bool_), options, None if seed is None else [seed])
         super().reset(seed=seed)
-        if seed is not None:
-            self.sim.seed([seed])
-        self.sim.begin(np.ones(1, dtype=np.bool_), options)
         self._show()
         return self._observe(), self._info(False)
 

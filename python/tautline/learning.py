@@ -1,4 +1,4 @@
-"""Parts of the learning environments that one replaces: what vehicles observe, and what they are rewarded for.
+"""Observations and rewards of the learning environments, which a program can replace.
 
 Both are called with the worlds of an environment::
 
@@ -27,7 +27,7 @@ from ._vector import VectorSimulation
 
 __all__ = ["VIOLATION", "Observation", "Observes", "Reward", "Rewards", "Worlds", "episode_seed"]
 
-#: Penalty of a violation.
+#: Penalty of a violation, in the unit of the reward [m].
 VIOLATION = 100.0
 
 
@@ -56,7 +56,7 @@ class Worlds(VectorSimulation):
         if (part := wanted._native.part_ignored_by_environments) is not None:
             key, what = part
             remedy = "give a scenario whose reference all vehicles know"
-            raise Error(f"scenario: an environment ignores {key} of {wanted.name} ({what}); {remedy}")
+            raise Error(f"scenario: an environment does not support {key} of {wanted.name} ({what}); {remedy}")
         super().__init__(wanted, num_envs, threads=threads)
         #: Axes of actions and observations: 2 in the plane z = 0, else 3.
         self.axes = 2 if wanted._native.is_plane else 3
@@ -69,32 +69,33 @@ class Worlds(VectorSimulation):
         """(E,) whether each world has a violation so far."""
         return self.least_clearance_m < 0
 
-    def seed(self, seeds: int | Sequence[int | None]) -> None:
-        """Begins the episodes of all worlds anew, or those with a seed in a list (E,)."""
-        if isinstance(seeds, (int, np.integer)):
-            base = whole_number(seeds, "seed")
-            given: list[tuple[int, int] | None] = [(base, e) for e in range(self.num_envs)]
-        else:
-            listed = self._seeds_or_none(seeds, np.ones(self.num_envs, dtype=np.bool_))
-            given = [None if base is None else (base, 0) for base in listed]
-        drawn = self._drawn()
-        kept = self._bases or [(drawn, e) for e in range(self.num_envs)]
-        self._bases = [new or old for new, old in zip(given, kept, strict=True)]
-        self._episodes[[new is not None for new in given]] = 0
+    def begin(
+        self,
+        mask: NDArray[np.bool_],
+        options: Mapping[str, Any] | None = None,
+        seed: int | Sequence[int | None] | None = None,
+    ) -> None:
+        """Begins the next episode of the worlds with ``mask`` (E,).
 
-    def begin(self, mask: NDArray[np.bool_], options: Mapping[str, Any] | None = None) -> None:
-        """Begins the next episode of the worlds with ``mask`` (E,)."""
-        if self._bases is None:
-            self.seed(self._drawn())
+        With a seed, these worlds begin the episodes of ``(seed, e)`` anew, with a list those of ``(seed[e], 0)``. Other
+        worlds keep their seeds, and all do if the reset is refused.
+        """
         chosen = self._mask(mask)
-        bases = self._bases or []
-        counted = zip(bases, self._episodes.tolist(), chosen.tolist(), strict=True)
-        seeds = [episode_seed(base, world, k) if is_chosen else None for (base, world), k, is_chosen in counted]
+        first = secrets.randbits(63)
+        bases = self._bases or [(first, e) for e in range(self.num_envs)]
+        given: list[tuple[int, int] | None] = [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            base = whole_number(seed, "seed")
+            given = [(base, e) for e in range(self.num_envs)]
+        elif seed is not None:
+            given = [None if base is None else (base, 0) for base in self._seeds_or_none(seed, chosen)]
+        new = np.array([base is not None for base in given]) & chosen
+        bases = [given[e] or bases[e] if new[e] else bases[e] for e in range(self.num_envs)]
+        episodes = np.where(new, 0, self._episodes)
+        of_worlds = zip(bases, episodes.tolist(), chosen.tolist(), strict=True)
+        seeds = [episode_seed(base, world, k) if is_chosen else None for (base, world), k, is_chosen in of_worlds]
         self.reset(chosen, seeds, **starts_of(options))
-        self._episodes[chosen] += 1
-
-    def _drawn(self) -> int:
-        return secrets.randbits(63)
+        self._bases, self._episodes = bases, episodes + chosen
 
     def ends(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Returns whether each episode is terminated, and whether it is truncated."""
@@ -121,7 +122,7 @@ def episode_seed(seed: int, world: int, episode: int) -> int:
 
 
 def starts_of(options: Mapping[str, Any] | None) -> dict[str, ArrayLike]:
-    """Returns the starts among the options of a reset. The options of others are ignored, as Gymnasium asks for."""
+    """Returns the starts among the options of a reset. Ignores other options, which Gymnasium allows for wrappers."""
     names = {"positions_m": "positions", "velocities_m_s": "velocities"}
     given = {key: value for key, value in (options or {}).items() if value is not None}
     if misspelt := [key for key in given if key not in names and str(key).startswith(("position", "velocit"))]:
@@ -152,7 +153,7 @@ class Observation:
 
     By default a vehicle observes what it knows: its own measured state, and the last positions that it received from
     the others. A vector to a vehicle from which nothing can be received is 0. With ``true_states`` the states are the
-    true ones. The vectors to obstacles are always true.
+    true ones. The vectors to obstacles start at the true position.
     """
 
     def __init__(self, *, true_states: bool = False) -> None:

@@ -96,9 +96,7 @@ class FormationEnv(Rendered, ParallelEnv):  # type: ignore[misc]
 
         ``options["positions_m"]`` and ``options["velocities_m_s"]`` are a start (N, 3).
         """
-        if seed is not None:
-            self.sim.seed([seed])
-        self.sim.begin(np.ones(1, dtype=np.bool_), options)
+        self.sim.begin(np.ones(1, dtype=np.bool_), options, None if seed is None else [seed])
         self.agents = list(self.possible_agents)
         self._show()
         return self._observe(), self._infos(False)

@@ -167,6 +167,9 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         .chain(film.map(|(path, _)| ("--film".to_owned(), path)))
         .collect();
     let inputs: Vec<NamedPath<'_>> = paths.iter().map(|path| ("the recording".to_owned(), *path)).collect();
+    if let Some(folder) = &arguments.out {
+        outputs::refuse_standard_output("--out", folder)?;
+    }
     outputs::check(&inputs, &outputs)?;
     let trail_s = arguments.trail.map(|trail_s| positive(trail_s, "--trail")).transpose()?;
     let [width, height] = arguments.size;
@@ -271,8 +274,8 @@ impl Batch<'_> {
         Ok(())
     }
 
-    /// Takes pictures at these times, each with a pair that it must show, and passes them on in order, in chunks; the
-    /// next chunk is drawn meanwhile.
+    /// Takes pictures at these times, each with a pair that it shows if possible, and passes them on in order, in
+    /// chunks; the next chunk is drawn meanwhile.
     fn shoot(
         &mut self,
         times: &[(f64, Option<Pair>)],

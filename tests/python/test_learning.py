@@ -69,6 +69,14 @@ class Gymnasium(Case):
         self.assertFalse((first == later).all())
         env.reset(seed=[None, 9, 9])
         self.assertEqual(env.sim.seeds.tolist(), [episode_seed(*of) for of in ((7, 0, 2), (9, 0, 0), (9, 0, 0))])
+        # Worlds outside of the mask, and all worlds after a refused reset, keep their seeds.
+        env.reset(seed=5, options={"reset_mask": np.array([True, False, False])})
+        self.refuses(tl.Error, "positions[0]", lambda: env.reset(seed=6, options={"positions_m": np.zeros((5, 2))}))
+        twin = copy.copy(env.sim)
+        twin.begin(np.ones(3, dtype=bool))
+        env.reset()
+        self.assertEqual(env.sim.seeds.tolist(), [episode_seed(*of) for of in ((5, 0, 1), (9, 0, 1), (9, 0, 1))])
+        self.assertEqual(twin.seeds.tolist(), env.sim.seeds.tolist())
         for make in FormationEnv, ParallelFormationEnv:
             one = make("pentagon", set=SHORT)
             one.reset(seed=9)
@@ -100,7 +108,7 @@ class Gymnasium(Case):
             crossed = {"positions_m": np.zeros((5, 2))}
             short, unknown = {"positions_m": np.zeros((4, 2))}, {"position": 1}
             for wrong, message in (
-                (crossed, "gives no valid scenario"),
+                (crossed, "positions[0]: "),
                 (short, "positions: an array of shape"),
                 (unknown, "unknown option position"),
             ):
@@ -189,8 +197,10 @@ class Gymnasium(Case):
                 pass
             self.assertEqual(ends[3].tolist(), [True, True])
             env.step(still)
-            first = [episode_seed(73, world, 1) for world in range(2)]
-            self.assertTrue(all((seed - start) % 2 == 0 for seed, start in zip(env.sim.seeds.tolist(), first)))
+            again = FormationVectorEnv("pentagon", 1, set=sets)
+            again.reset(seed=73)
+            again.reset()
+            self.assertEqual(env.sim.seeds[0], again.sim.seeds[0], "the number of worlds does not count")
         # Of many random first seeds some have no valid start.
         FormationVectorEnv("pentagon", 300, set=sets).reset()
         for make in (FormationEnv, ParallelFormationEnv):
@@ -204,7 +214,7 @@ class Gymnasium(Case):
         for name in tl.scenarios():
             hz = tl.Scenario(name).dt_s ** -1
             if name in ("leader-lossy", "pentagon-leader"):
-                message = f"scenario: an environment ignores reference.leader of {name}"
+                message = f"scenario: an environment does not support reference.leader of {name}"
                 for make in (FormationEnv, FormationVectorEnv, ParallelFormationEnv):
                     self.refuses(tl.Error, message, lambda make=make, name=name: make(name))
                 continue
@@ -348,6 +358,7 @@ class Gymnasium(Case):
             self.assertGreater((first != 255).any(axis=-1).sum(), 1000)
             env.sim.step(np.ones((1, len(env.sim.scenario), 3)), steps=400)
             self.assertTrue((env.render() != first).any())
+            self.assertEqual(copy.deepcopy(env).render().shape, first.shape)
             env.close()
             self.refuses(tl.Error, "render_mode: must be rgb_array or human", lambda make=make: make(render_mode="x"))
         vector = FormationVectorEnv("pentagon", 2, render_mode="rgb_array")

@@ -241,7 +241,8 @@ impl Extent {
     }
 
     /// Returns the camera of a view for a picture of a pair. If an obstacle hides a vehicle of the pair, the camera
-    /// `Auto` turns until both are seen and the fewest other vehicles are hidden, by the smallest such angle.
+    /// `Auto` turns to a direction that shows both and hides the fewest other vehicles; of equal ones, to the smallest
+    /// angle. Without such a direction it keeps its own.
     ///
     /// # Errors
     /// As [`Extent::camera`].

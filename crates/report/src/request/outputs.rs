@@ -88,12 +88,15 @@ pub fn is_standard_output(file: &Path) -> bool {
 }
 
 /// Rejects `-`: the name would be taken for standard output, which this output cannot go to.
-fn refuse_standard_output(option: &str, path: &Path) -> Result<(), Failure> {
+///
+/// # Errors
+/// [`Failure`] that names the output.
+pub fn refuse_standard_output(option: &str, path: &Path) -> Result<(), Failure> {
     if !is_standard_output(path) {
         return Ok(());
     }
     let message = format!("{option}: cannot go to standard output");
-    let help = format!("name a file or folder; {STANDARD_OUTPUT} as a name is written ./{STANDARD_OUTPUT}");
+    let help = format!("give a file or folder; for a file named {STANDARD_OUTPUT} write ./{STANDARD_OUTPUT}");
     Err(Failure::input("files/no-standard-output", message, help))
 }
 

@@ -81,9 +81,9 @@ impl Actuation {
         }
     }
 
-    /// Replaces the commands at a time \[s\] by accelerations. Times must not decrease; a repeated time replaces the
-    /// previous call.
-    pub(super) fn act(&mut self, time_s: f64, command: &mut Rows) {
+    /// Replaces the commands at a time \[s\] by accelerations. Times must not decrease. A repeated time replaces the
+    /// previous call; with `begins`, the accelerations of the previous call stay, and the commands act from now on.
+    pub(super) fn act(&mut self, time_s: f64, command: &mut Rows, begins: bool) {
         if let Some(most_m_s2) = self.spec.max_accel_m_s2 {
             for i in 0..command.nrows() {
                 let limited = row(command, i).cap_magnitude(most_m_s2);
@@ -91,12 +91,15 @@ impl Actuation {
             }
         }
         let Some(lag) = &mut self.lag else { return };
-        if time_s > lag.now.time_s + SAME_S {
+        let is_repeated = time_s <= lag.now.time_s + SAME_S;
+        if !is_repeated {
             std::mem::swap(&mut lag.before, &mut lag.now);
             lag.now.time_s = time_s;
         }
         lag.now.command.copy_from(command);
-        lag.follow(self.spec.lag_s, self.holds);
+        if !(is_repeated && begins) {
+            lag.follow(self.spec.lag_s, self.holds);
+        }
         command.copy_from(&lag.now.accelerations);
     }
 }
@@ -133,7 +136,7 @@ mod tests {
     #[test]
     fn only_commands_above_the_limit_are_scaled_down() {
         let mut command = Rows::from_row_slice(&[3.0, 4.0, 0.0, 0.3, -0.4, 0.0]);
-        actuation(Some(1.0), 0.0, None).act(0.0, &mut command);
+        actuation(Some(1.0), 0.0, None).act(0.0, &mut command, false);
         let expected = Rows::from_row_slice(&[0.6, 0.8, 0.0, 0.3, -0.4, 0.0]);
         assert!((command - expected).amax() < 1e-15);
     }
@@ -153,9 +156,9 @@ mod tests {
                     let time_s = 0.4 * f64::from(k) / f64::from(parts);
                     acceleration.fill(if holds.is_some() { 1.0 } else { time_s });
                     let again = acceleration.clone();
-                    actuation.act(time_s, &mut acceleration);
+                    actuation.act(time_s, &mut acceleration, false);
                     acceleration.copy_from(&again);
-                    actuation.act(time_s, &mut acceleration);
+                    actuation.act(time_s, &mut acceleration, false);
                 }
                 assert!((acceleration[(1, 2)] - exact).abs() < 1e-14, "{parts} {holds:?}: {}", acceleration[(1, 2)]);
             }

@@ -104,6 +104,11 @@ pub trait Imperfections: DynClone + Send {
     /// of the law, `_command` is the held command. Of two calls for the same instant the last counts.
     fn actuate(&mut self, _time_s: f64, _command: &mut Rows) {}
 
+    /// As [`Imperfections::actuate`], for a command that begins at this time and is no continuation of earlier ones.
+    fn actuate_anew(&mut self, time_s: f64, command: &mut Rows) {
+        self.actuate(time_s, command);
+    }
+
     /// Takes the next state of the flight, in the order of time.
     fn accept(&mut self, _time_s: f64, _truth: &Swarm) {}
 
@@ -322,7 +327,12 @@ impl Imperfections for ScenarioImperfections {
 
     fn actuate(&mut self, time_s: f64, command: &mut Rows) {
         self.failures.act(time_s, command);
-        self.actuation.act(time_s, command);
+        self.actuation.act(time_s, command, false);
+    }
+
+    fn actuate_anew(&mut self, time_s: f64, command: &mut Rows) {
+        self.failures.act(time_s, command);
+        self.actuation.act(time_s, command, true);
     }
 
     fn accept(&mut self, time_s: f64, truth: &Swarm) {

@@ -51,8 +51,8 @@ impl RadioUse {
 
 /// Radio of a flight: rounds of messages under way, with delay, loss, links that are down and vehicles that are silent.
 ///
-/// The fate of a message depends only on the seed, the use, the sender, the number of the round and the place of the
-/// link in the list.
+/// The random numbers of a message depend only on the seed, the use, the sender, the number of the round and the place
+/// of the link in the list.
 #[derive(Clone, Debug)]
 pub(crate) struct Radio<T> {
     latency_s: f64,

@@ -29,6 +29,8 @@ pub(super) struct Controller {
     pub(super) shield: Option<ShieldStage>,
     /// Whether the shield has no command at the present instant of command yet.
     pub(super) awaits_command: bool,
+    /// Whether the next command begins at its instant: commands of the law and from outside do not continue each other.
+    pub(super) begins: bool,
     /// Last command of the law or from outside, as the shield changed it, N x 3 \[m/s^2\].
     commanded: Rows,
 }
@@ -58,6 +60,7 @@ impl Controller {
             near,
             shield,
             awaits_command: false,
+            begins: false,
             commanded,
         })
     }
@@ -115,6 +118,7 @@ impl Controller {
     /// the vehicles.
     pub(super) fn filter(&mut self, time_s: f64, truth: &Swarm, given: &Rows, command: &mut Rows) {
         self.commanded.copy_from(given);
+        self.begins = true;
         let own = self.link.sense(time_s, truth).own;
         if let Some(shield) = &mut self.shield {
             shield.filter(time_s, truth, own, &mut self.commanded);
@@ -132,7 +136,11 @@ impl Controller {
     /// Writes the accelerations at a time \[s\] that result from the last command.
     pub(super) fn actuate(&mut self, time_s: f64, command: &mut Rows) {
         command.copy_from(&self.commanded);
-        self.link.actuate(time_s, command);
+        if std::mem::take(&mut self.begins) {
+            self.link.actuate_anew(time_s, command);
+        } else {
+            self.link.actuate(time_s, command);
+        }
     }
 
     /// Returns the supervisor's last change within a leg, and the new certificate from this true state.

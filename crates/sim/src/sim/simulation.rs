@@ -183,6 +183,7 @@ impl Simulation {
         if self.ending.is_none() && std::mem::take(&mut self.overruled) {
             // A shield keeps its command until its next instant.
             if std::mem::take(&mut self.controller.awaits_command) || self.controller.shield.is_none() {
+                self.controller.begins = true;
                 let asked = self.evaluate_law();
                 self.end_if_over(asked);
             }

@@ -77,7 +77,7 @@ pub enum SeedChoice {
     /// The next seed of the world with a valid start: its seed plus E, or else E later, at most 1000 seeds.
     #[default]
     Next,
-    /// The first seed with a valid start: this one, or else E later, at most 1000 seeds.
+    /// The first seed with a valid start, from this one on, at most 1000 seeds.
     From(u64),
     /// This seed. It is an error if it has no valid start.
     Exactly(u64),
@@ -155,6 +155,14 @@ pub enum VectorError {
         /// Reason.
         why: ScenarioError,
     },
+    /// A given start is not valid.
+    #[error("positions[{world}]: {why}")]
+    Start {
+        /// The world, from 0.
+        world: usize,
+        /// Reason.
+        why: ScenarioError,
+    },
     /// No seed of a search gives a valid start. If a world is reset because it ended, the other worlds have advanced.
     #[error("seeds[{world}]: {MOST_SEEDS} seeds from {first} on give no valid scenario, the last one because of {why}")]
     NoSeed {
@@ -224,6 +232,8 @@ struct Search<'a> {
     first: u64,
     /// Whether seeds after the first one are tried.
     goes_on: bool,
+    /// Whether every seed is tried, not only those of the world.
+    takes_every: bool,
 }
 
 /// Found seed with the simulation at its start, or the error of a search.
@@ -248,7 +258,7 @@ impl<'a> Search<'a> {
             SeedChoice::From(first) => (first, true),
             SeedChoice::Exactly(first) => (first, false),
         };
-        Self { given: None, world, first, goes_on }
+        Self { given: None, world, first, goes_on, takes_every: matches!(choice, SeedChoice::From(_)) }
     }
 
     /// Returns the search with given states, which no other seed changes.
@@ -689,17 +699,18 @@ impl Starts {
 
     /// Returns the next seed of a world, among those of a scenario file.
     fn later(&self, seed: u64) -> u64 {
-        seed.wrapping_add(self.worlds) & i64::MAX.cast_unsigned()
+        next_seed(seed, self.worlds)
     }
 
     /// Returns a simulation at the start of a seed, or at a given one.
     fn simulation(&self, world: usize, seed: u64, given: Option<Swarm>) -> Result<Simulation, VectorError> {
-        let refused = |why| VectorError::Seed { world, seed, why };
+        let refused = |why| VectorError::Start { world, why };
         match (&self.common, given) {
             (Some(common), None) => Ok(common.lock().unwrap_or_else(PoisonError::into_inner).clone()),
             (Some(_), Some(start)) => started(&starting_at(self.template.own().clone(), start).map_err(refused)?),
             (None, given) => {
-                let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None }).map_err(refused)?;
+                let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None });
+                let drawn = drawn.map_err(|why| VectorError::Seed { world, seed, why })?;
                 match given {
                     None => started(&drawn),
                     Some(start) => started(&starting_at(drawn, start).map_err(refused)?),
@@ -707,6 +718,11 @@ impl Starts {
             }
         }
     }
+}
+
+/// Returns a seed after another one, among those of a scenario file.
+fn next_seed(seed: u64, by: u64) -> u64 {
+    seed.wrapping_add(by) & i64::MAX.cast_unsigned()
 }
 
 fn starting_at(scenario: Scenario, start: Swarm) -> Result<Scenario, ScenarioError> {
@@ -731,7 +747,7 @@ impl<'a> Attempt<'a> {
 
     /// Tries the next seed.
     fn try_next(&mut self, starts: &Starts) {
-        let Search { given, world, first, goes_on } = self.search;
+        let Search { given, world, first, goes_on, takes_every } = self.search;
         self.tried += 1;
         let given = given.map(|given| given.of(world, starts.template.own().count()));
         self.made = match starts.simulation(world, self.seed, given) {
@@ -740,7 +756,7 @@ impl<'a> Attempt<'a> {
             made => Some(made.map(|simulation| (self.seed, simulation))),
         };
         if self.made.is_none() {
-            self.seed = starts.later(self.seed);
+            self.seed = if takes_every { next_seed(self.seed, 1) } else { starts.later(self.seed) };
         }
     }
 }

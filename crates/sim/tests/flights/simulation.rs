@@ -193,6 +193,40 @@ fn commands_from_outside_pass_through_shield_and_actuators() {
 }
 
 #[test]
+fn commands_from_outside_are_held_between_changes_also_behind_a_lag() {
+    let read = |sets: &[&str]| builtin("pentagon", &[&["actuation={lag_s=0.2}"], sets].concat());
+    let continuous = read(&["time={duration_s=5}"]);
+    let held = read(&["time={duration_s=5, control_hz=240}"]);
+    let pushes = [1.0, -1.0, 0.5].map(|push| push * &continuous.start.positions_m);
+    let start = |scenario: &Scenario| Simulation::new(scenario).expect("a simulation");
+    let (mut first, mut second) = (start(&continuous), start(&held));
+    for push in &pushes {
+        for _ in 0..24 {
+            first.step_with(push).expect("finite commands");
+            second.step_with(push).expect("finite commands");
+            let off_m = (&first.state().positions_m - &second.state().positions_m).amax();
+            assert!(off_m < 1e-12, "a held command is no ramp: {off_m}");
+        }
+    }
+    // A law with the same commands, before and after commands from outside.
+    let by_law = |push: &Rows| Components::with_law(&continuous, Box::new(Constant(push.clone())));
+    let mut mixed = Simulation::with(&continuous, by_law(&pushes[1])).expect("a simulation");
+    let mut by_hand = start(&held);
+    for (push, law_flies) in [(&pushes[1], true), (&pushes[0], false), (&pushes[1], true)] {
+        for _ in 0..24 {
+            by_hand.step_with(push).expect("finite commands");
+            if law_flies {
+                mixed.step();
+            } else {
+                mixed.step_with(push).expect("finite commands");
+            }
+            let off_m = (&mixed.state().positions_m - &by_hand.state().positions_m).amax();
+            assert!(off_m < 1e-12, "{off_m}");
+        }
+    }
+}
+
+#[test]
 fn a_shield_takes_commands_at_its_own_instants_only() {
     let scenario = builtin("shielded-crazyflies", &["time.duration_s=5"]);
     let mut mixed = Simulation::new(&scenario).expect("a simulation");
