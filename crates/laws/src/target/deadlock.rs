@@ -31,7 +31,7 @@ pub struct DeadlockOptions {
     /// First scale of the slots about their centre; each further time on a leg it is larger by one.
     #[schemars(extend("minimum" = 1))]
     pub scale: f64,
-    /// Largest number of times that slots are spread on a leg.
+    /// Largest number of times that slots are spread on a leg, and of reassignments of a stalled swarm on it.
     pub most: u32,
     /// Shortest time for which spread slots are held in s.
     #[serde(skip_serializing_if = "is_zero")]
@@ -104,8 +104,9 @@ const CLOSED: f64 = 0.01;
 enum Phase {
     /// Slots are those of the leg; no progress since this time \[s\].
     Flying { idle_since_s: Option<f64> },
-    /// Slots have been spread since `since_s`, without progress towards them since `idle_since_s` \[s\].
-    Spread { scale: f64, since_s: f64, idle_since_s: Option<f64> },
+    /// Slots have been spread since `since_s`, without progress towards them since `idle_since_s` \[s\]. `slots_m` is
+    /// the smallest distance of two slots of the leg \[m\].
+    Spread { scale: f64, since_s: f64, idle_since_s: Option<f64>, slots_m: f64 },
     /// Slots have been closing since this time \[s\].
     Closing { scale: f64, since_s: f64 },
 }
@@ -215,7 +216,8 @@ impl DeadlockResolver {
         let scale = self.deadlock.scale + f64::from(self.recoveries);
         self.recoveries += 1;
         self.change = Some(Change::Spread { scale });
-        self.phase = Phase::Spread { scale, since_s, idle_since_s: None };
+        let slots_m = leg.formation.min_distance().map_or(f64::INFINITY, |(_, distance_m)| distance_m);
+        self.phase = Phase::Spread { scale, since_s, idle_since_s: None, slots_m };
         target.spread_formation(&leg.formation, scale, self.leader);
     }
 
@@ -246,10 +248,9 @@ impl DeadlockResolver {
                     self.spread(time_s, leg, target);
                 }
             }
-            Phase::Spread { scale, since_s, idle_since_s } => {
-                let slots_m = leg.formation.min_distance().map_or(f64::INFINITY, |(_, distance_m)| distance_m);
+            Phase::Spread { scale, since_s, idle_since_s, slots_m } => {
                 let idle_since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
-                self.phase = Phase::Spread { scale, since_s, idle_since_s };
+                self.phase = Phase::Spread { scale, since_s, idle_since_s, slots_m };
                 // Vehicles without progress towards spread slots are not blocked by each other.
                 let gives_up = idle_since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S.max(self.stalled_s()));
                 let is_held = time_s - since_s >= self.deadlock.hold_s;
