@@ -168,16 +168,12 @@ pub(super) fn is_shorter(r: &[DoubleDouble; 3], x: f64) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use num_rational::BigRational;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::fractions::{Fraction, exact};
 
-    fn exact(number: f64) -> BigRational {
-        BigRational::from_float(number).expect("a finite number")
-    }
-
-    fn value(number: DoubleDouble) -> BigRational {
+    fn value(number: DoubleDouble) -> Fraction {
         exact(number.high) + exact(number.low)
     }
 
@@ -197,7 +193,7 @@ mod tests {
             prop_assume!(a.high != 0.0 && b.high != 0.0);
             // A second operand that nearly cancels.
             let almost = two_sum(-a.high * (1.0 + f64::from(near) * f64::EPSILON), 0.5 * a.low);
-            let within = |found: DoubleDouble, expected: BigRational, bound: f64| {
+            let within = |found: DoubleDouble, expected: Fraction, bound: f64| {
                 let off = value(found) - &expected;
                 let most = exact(bound) * expected;
                 &off * &off <= &most * &most

@@ -46,6 +46,8 @@ mod enclosure;
 pub mod envelope;
 mod exact;
 mod findings;
+#[cfg(test)]
+mod fractions;
 mod ledger;
 mod obstacle;
 mod outcome;

@@ -140,20 +140,16 @@ impl Div for Enclosed {
 
 #[cfg(test)]
 mod tests {
-    use num_rational::BigRational;
     use proptest::prelude::*;
 
     use super::*;
-
-    fn exact(number: f64) -> BigRational {
-        BigRational::from_float(number).expect("a finite number")
-    }
+    use crate::fractions::{Fraction, exact};
 
     proptest! {
         #[test]
         fn every_operation_contains_the_exact_result(a in -1e3..1e3_f64, b in -1e3..1e3_f64) {
             let (x, y) = (Enclosed::exactly(a), Enclosed::exactly(b));
-            let holds = |x: Enclosed, result: BigRational| exact(x.low) <= result && result <= exact(x.high);
+            let holds = |x: Enclosed, result: Fraction| exact(x.low) <= result && result <= exact(x.high);
             prop_assert!(holds(x + y, exact(a) + exact(b)));
             prop_assert!(holds(x - y, exact(a) - exact(b)));
             prop_assert!(holds(Enclosed::difference(a, b), exact(a) - exact(b)));

@@ -1,12 +1,12 @@
 //! Exactness of verdicts on straight lines: compared with exact fractions, to the last bit.
 
 use nalgebra::Vector3;
-use num_rational::BigRational;
 use tautline_audit::Status;
 use tautline_audit::recorded::{Interpolation, Outcome, Settings, audit};
 
+use crate::fractions::{Fraction, exact};
 use crate::recorded::{judge, seen};
-use crate::scenes::{Random, Tracks, exact, exact_place, exact_squared, instants, items, scene};
+use crate::scenes::{Random, Tracks, exact_place, exact_squared, instants, items, scene};
 
 /// Number of scenes by default, and with `TAUTLINE_LONG=1`.
 const SCENES: u64 = 60;
@@ -23,7 +23,7 @@ fn judge_scene(tracks: &Tracks, settings: Settings) -> Outcome {
 }
 
 /// Returns the exact square of the smallest distance of two vehicles in a window.
-fn least_of(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)], window_s: [f64; 2]) -> Option<BigRational> {
+fn least_of(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)], window_s: [f64; 2]) -> Option<Fraction> {
     let times_s = instants(a, b);
     let (first_s, last_s) = (times_s.first()?.max(window_s[0]), times_s.last()?.min(window_s[1]));
     let mut times_s: Vec<f64> = times_s.into_iter().filter(|time_s| (first_s..=last_s).contains(time_s)).collect();
@@ -39,7 +39,7 @@ fn least_of(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)], window_s: [f64
     times_s.windows(2).map(|two| exact_squared(&apart(two[0]), &apart(two[1]))).min()
 }
 
-fn least(tracks: &Tracks, window_s: [f64; 2]) -> Option<BigRational> {
+fn least(tracks: &Tracks, window_s: [f64; 2]) -> Option<Fraction> {
     let pairs = (0..tracks.len()).flat_map(|i| (i + 1..tracks.len()).map(move |j| (i, j)));
     pairs.filter_map(|(i, j)| least_of(&tracks[i], &tracks[j], window_s)).min()
 }

@@ -5,7 +5,8 @@ use proptest::prelude::*;
 use tautline_audit::{AuditError, AuditOutcome, Auditor, Status, Violation};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, row, separation, set_row};
 
-use crate::scenes::{exact, exact_squared};
+use crate::fractions::exact;
+use crate::scenes::exact_squared;
 
 const DELTA_M: f64 = 2.0;
 

@@ -7,6 +7,8 @@ mod envelope;
 mod exact;
 mod findings;
 mod flown;
+#[path = "../../src/fractions.rs"]
+mod fractions;
 mod many_findings;
 mod plan;
 mod presence;

@@ -7,11 +7,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
-use num_rational::BigRational;
 use tautline_audit::Status;
 use tautline_audit::recorded::{ObjectPair, Outcome, Settings, audit};
 use tautline_core::swarm::Pair;
 use tautline_core::track::{Item, Sample};
+
+use crate::fractions::{Fraction, exact};
 
 /// Number of scenes by default and with `TAUTLINE_LONG=1`; `TAUTLINE_SCENES` overrides both.
 const SCENES: u64 = 3000;
@@ -166,11 +167,7 @@ pub(crate) fn place(track: &[(f64, Vector3<f64>)], time_s: f64) -> Vector3<f64> 
     p0 + (p1 - p0) * ((time_s - t0) / (t1 - t0))
 }
 
-pub(crate) fn exact(number: f64) -> BigRational {
-    BigRational::from_float(number).expect("finite")
-}
-
-pub(crate) fn exact_place(track: &[(f64, Vector3<f64>)], time_s: f64) -> [BigRational; 3] {
+pub(crate) fn exact_place(track: &[(f64, Vector3<f64>)], time_s: f64) -> [Fraction; 3] {
     let next = track.partition_point(|seen| seen.0 < time_s);
     let fraction = |axis: usize| exact(track[next].1[axis]);
     if track[next].0 == time_s {
@@ -182,8 +179,8 @@ pub(crate) fn exact_place(track: &[(f64, Vector3<f64>)], time_s: f64) -> [BigRat
 }
 
 /// Returns the exact square of the smallest distance between two instants.
-pub(crate) fn exact_squared(from: &[BigRational; 3], to: &[BigRational; 3]) -> BigRational {
-    let dot = |a: &[BigRational; 3], b: &[BigRational; 3]| &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2];
+pub(crate) fn exact_squared(from: &[Fraction; 3], to: &[Fraction; 3]) -> Fraction {
+    let dot = |a: &[Fraction; 3], b: &[Fraction; 3]| &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2];
     let by = [0, 1, 2].map(|axis| &to[axis] - &from[axis]);
     let zero = exact(0.0);
     let (towards, beyond, length) = (dot(from, &by), dot(to, &by), dot(&by, &by));
@@ -238,7 +235,7 @@ fn brute_force(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> Option<E
 }
 
 /// Returns a double close to a fraction.
-fn nearest_double(fraction: &BigRational) -> f64 {
+fn nearest_double(fraction: &Fraction) -> f64 {
     let (above, below) = (fraction.numer(), fraction.denom());
     let shift = i64::try_from(above.bits()).expect("small") - i64::try_from(below.bits()).expect("small");
     // Scaled so that the integer quotient has about 64 bits.
