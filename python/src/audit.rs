@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use tautline::audit::recorded::{self, Settings};
 use tautline::fact::Fact;
 use tautline::mcap::RunAudit;
+use tautline::read::{self, ReadError};
 use tautline::report::recorded::RecordedReport;
 use tautline::request::audit::Open;
 use tautline::request::{self, AuditRequest, Failure, Monitor as _, OwnRecording, Silent, Subject};
@@ -126,6 +127,28 @@ pub(crate) fn audit_files(
 ) -> PyResult<AuditOutcome> {
     let subject = Subject::Files { paths, options: Box::new(options.0.clone()) };
     let monitor = Silent::default();
+    let request = AuditRequest { command: command.to_owned(), html, ..AuditRequest::new(subject, question.0.clone()) };
+    let audited = run_in_thread(py, monitor.interruption(), || request::audit_files(&request, &monitor))?;
+    judged(&audited.map_err(Failure::into_exception)?.report)
+}
+
+/// Audits a table in memory, which is in a file of Parquet. Writes a page to `html`, if given.
+#[pyfunction]
+pub(crate) fn audit_table(
+    py: Python<'_>,
+    question: &AuditOptions,
+    command: &str,
+    table: PathBuf,
+    options: &ReadOptions,
+    html: Option<PathBuf>,
+) -> PyResult<AuditOutcome> {
+    const NAME: &str = "table";
+    let monitor = Silent::default();
+    let open: &Open<'_> = &|| match read::open(&table, &options.0) {
+        Ok(recording) => Ok(Box::new(recording)),
+        Err(error) => Err(ReadError { file: NAME.to_owned(), ..error }),
+    };
+    let subject = Subject::InMemory { name: NAME, own: None, open };
     let request = AuditRequest { command: command.to_owned(), html, ..AuditRequest::new(subject, question.0.clone()) };
     let audited = run_in_thread(py, monitor.interruption(), || request::audit_files(&request, &monitor))?;
     judged(&audited.map_err(Failure::into_exception)?.report)

@@ -9,7 +9,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use tautline::law::{Capabilities, Controls, Law, LawError};
 use tautline::observation;
-use tautline::scenario::Scenario;
+use tautline::scenario::{ExternalLaw, Scenario};
 use tautline::swarm::Rows;
 
 use crate::errors::{wrong_input, wrong_type};
@@ -119,6 +119,31 @@ impl PythonLaw {
         command.iter_mut().enumerate().for_each(|(k, x)| *x = written[(k % count, k / count)]);
         Ok(())
     }
+}
+
+/// Returns the law that a name `MODULE:CLASS` imports. Every flight gets a new object.
+pub(crate) fn load_law(py: Python<'_>, name: &str) -> PyResult<ExternalLaw> {
+    let (make, sha256) =
+        py.import("tautline._law")?.call_method1("import_law", (name,))?.extract::<(Py<PyAny>, String)>()?;
+    let named = {
+        let name = name.to_owned();
+        move |py: Python<'_>| {
+            PyResult::Ok(PythonLaw { name: name.clone(), ..PythonLaw::new(&make.call0(py)?.into_bound(py), None)? })
+        }
+    };
+    let first = named(py)?;
+    let failing = first.clone();
+    let make = move || -> Box<dyn Law> {
+        Python::attach(|py| match named(py) {
+            Ok(law) => Box::new(law),
+            Err(raised) => {
+                RAISED.set(Some(raised));
+                // Each of its commands fails.
+                Box::new(failing.clone().repeating(vec![None]))
+            }
+        })
+    };
+    Ok(ExternalLaw::new(first).from_source(sha256, make))
 }
 
 impl Law for PythonLaw {

@@ -30,7 +30,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::audit::{FlightFindings, audit_arrays, audit_files, audit_in_rust};
+    use super::audit::{FlightFindings, audit_arrays, audit_files, audit_in_rust, audit_table};
     #[pymodule_export]
     use super::errors::Error;
     #[pymodule_export]
@@ -50,7 +50,9 @@ mod _native {
     #[pymodule_export]
     use super::simulation::Simulation;
     #[pymodule_export]
-    use super::studies::{attack, campaign, compare, export, margin, proportion, scenarios, sweep, validate};
+    use super::studies::{
+        CampaignFolder, attack, campaign, compare, export, margin, proportion, scenarios, sweep, validate,
+    };
     #[pymodule_export]
     use super::vector::VectorSimulation;
 

@@ -6,13 +6,13 @@ use pyo3::conversion::FromPyObjectOwned;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tautline::attack::Bound as Bounds;
-use tautline::campaign::CampaignRequest;
+use tautline::campaign::{CampaignRequest, Folder, Program};
 use tautline::export::WRITTEN;
 use tautline::export::drones::Dialect;
 use tautline::margin::Range;
 use tautline::report::recorded::RecordedReport;
 use tautline::request::{
-    DroneExportOptions, DroneExportRequest, ExportRequest, Failure, Monitor, ScenarioRequest, Silent, export_drones,
+    DroneExportOptions, DroneExportRequest, ExportRequest, Failure, Monitor, ScenarioRequest, export_drones,
     export_file,
 };
 use tautline::scenario::{ExternalLaw, builtin};
@@ -22,10 +22,10 @@ use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
 
 use crate::errors::{IntoException as _, internal_error};
-use crate::law::{PythonLaw, catch_exception};
+use crate::law::{PythonLaw, catch_exception, load_law};
 use crate::request::{ReadOptions, choice};
 use crate::scenario::Scenario;
-use crate::work::{SignalMonitor, run_detached, run_in_thread_with_pool};
+use crate::work::{StudyMonitor, run_detached, run_study};
 
 /// Whether a result is good, its headline, its summary, and the result as JSON.
 type Answer = (bool, String, String, String);
@@ -34,18 +34,23 @@ type Answer = (bool, String, String, String);
 fn answered<T: Send>(
     py: Python<'_>,
     has_law: bool,
+    progress: Option<Py<PyAny>>,
     work: impl FnOnce(&dyn Monitor) -> Result<T, Failure> + Send,
 ) -> PyResult<T> {
-    if has_law {
-        let monitor = SignalMonitor::new();
+    let monitor = StudyMonitor::new(progress, has_law);
+    let answer = if has_law {
         let (answer, raised) = run_detached(py, || catch_exception(|| work(&monitor)))?;
-        return match monitor.raised().or(raised) {
-            Some(raised) => Err(raised),
-            None => answer.map_err(Failure::into_exception),
-        };
-    }
-    let monitor = Silent::default();
-    run_in_thread_with_pool(py, monitor.interruption(), || work(&monitor))?.map_err(Failure::into_exception)
+        monitor.report(py)?;
+        if let Some(raised) = monitor.raised().or(raised) {
+            return Err(raised);
+        }
+        answer
+    } else {
+        let answer = run_study(py, &monitor, || work(&monitor))?;
+        monitor.report(py)?;
+        answer
+    };
+    answer.map_err(Failure::into_exception)
 }
 
 /// Returns the result of a study that was not interrupted.
@@ -101,10 +106,10 @@ pub(crate) fn export(
     let (format, dialect) = choice("to", to, &lossless.chain(of_drones).collect::<Vec<_>>())?.unwrap_or_default();
     let file = ExportRequest { paths, options, output, format, sample_hz, force };
     let Some(dialect) = dialect else {
-        return answered(py, false, |monitor| export_file(&file, monitor)).map(|()| None);
+        return answered(py, false, None, |monitor| export_file(&file, monitor)).map(|()| None);
     };
     let request = DroneExportRequest { file, dialect, options: drone_options(drones)? };
-    let exported = answered(py, false, |monitor| export_drones(&request, monitor))?;
+    let exported = answered(py, false, None, |monitor| export_drones(&request, monitor))?;
     let refusal = exported.refusal.as_ref().map(Failure::in_words);
     let headline = refusal.or_else(|| exported.audit.as_ref().map(RecordedReport::headline));
     let headline = headline.unwrap_or_else(|| "not judged: there is one vehicle and no obstacle".to_owned());
@@ -124,6 +129,8 @@ pub(crate) struct Outputs {
     force: bool,
     #[pyo3(item)]
     threads: Option<usize>,
+    #[pyo3(item)]
+    progress: Option<Py<PyAny>>,
 }
 
 /// Returns a law in Python as an external law.
@@ -144,11 +151,11 @@ where
 {
     let external_law = law.map(|law| external(law, Some(scenario))).transpose()?;
     let has_law = external_law.is_some() || !options.external_laws().is_empty();
-    let Outputs { csv, latex, html, force, threads } = outputs;
+    let Outputs { csv, latex, html, force, threads, progress } = outputs;
     let files = StudyFiles { json: None, csv, latex, html, force };
     let scenario = ScenarioRequest { external_law, ..scenario.request.clone() };
     let request = StudyRequest { scenario, options, files, threads };
-    let study = whole(answered(py, has_law, |monitor| tautline::studies::answer(&request, &(), monitor))?)?;
+    let study = whole(answered(py, has_law, progress, |monitor| tautline::studies::answer(&request, &(), monitor))?)?;
     answer_of(&study)
 }
 
@@ -255,40 +262,144 @@ pub(crate) fn attack(
 
 /// Measures the claims of the paper and of tautline.
 #[pyfunction]
-pub(crate) fn validate(py: Python<'_>, out: PathBuf, force: bool, threads: Option<usize>) -> PyResult<Answer> {
+pub(crate) fn validate(
+    py: Python<'_>,
+    out: PathBuf,
+    force: bool,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Answer> {
     let request = ValidateRequest { out, force, threads };
-    let validation = answered(py, false, |monitor| validate_into(&request, monitor))?;
+    let validation = answered(py, false, progress, |monitor| validate_into(&request, monitor))?;
     Ok((validation.pass, validation.headline(), validation.text(), json(validation.to_json())?))
+}
+
+/// Specification, folder and early end of a campaign, and the law in Python that flies every run.
+#[derive(FromPyObject)]
+pub(crate) struct CampaignPlan<'py> {
+    #[pyo3(item)]
+    spec: PathBuf,
+    /// Text of the specification, in the place of that of the file.
+    #[pyo3(item)]
+    text: Option<String>,
+    /// An object, or `MODULE:CLASS`.
+    #[pyo3(item)]
+    law: Option<Bound<'py, PyAny>>,
+    #[pyo3(item)]
+    out: Option<PathBuf>,
+    #[pyo3(item)]
+    shards: Option<u64>,
+    #[pyo3(item)]
+    until_width: Option<f64>,
+    #[pyo3(item)]
+    until_decided: Option<f64>,
+}
+
+impl CampaignPlan<'_> {
+    fn request(self) -> PyResult<CampaignRequest> {
+        let Self { spec, text, law, out, shards, until_width, until_decided } = self;
+        let external_law = law.map(|law| match law.extract::<String>() {
+            Ok(name) => load_law(law.py(), &name),
+            Err(_) => external(&law, None),
+        });
+        Ok(CampaignRequest {
+            text,
+            out,
+            shards,
+            until_width,
+            until_decided,
+            external_law: external_law.transpose()?,
+            ..CampaignRequest::new(spec)
+        })
+    }
 }
 
 /// Flies a campaign. Returns its answer and its folder.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn campaign(
     py: Python<'_>,
-    spec: PathBuf,
-    law: Option<&Bound<'_, PyAny>>,
-    out: Option<PathBuf>,
-    shards: Option<u64>,
+    plan: CampaignPlan<'_>,
     threads: Option<usize>,
-    until_width: Option<f64>,
-    until_decided: Option<f64>,
     worst: usize,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<(Answer, PathBuf)> {
-    let external_law = law.map(|law| external(law, None)).transpose()?;
-    let has_law = external_law.is_some();
-    let request = CampaignRequest {
-        out,
-        shards,
-        threads,
-        until_width,
-        until_decided,
-        worst,
-        external_law,
-        ..CampaignRequest::new(spec)
-    };
-    let summary = whole(answered(py, has_law, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
-    Ok((answer_of(&summary)?, request.folder()))
+    let request = CampaignRequest { threads, worst, ..plan.request()? };
+    let has_law = request.external_law.is_some();
+    let flown = answered(py, has_law, progress, |monitor| tautline::campaign::campaign(&request, &(), monitor));
+    Ok((answer_of(&whole(flown?)?)?, request.folder()))
+}
+
+/// A planned campaign in a folder, with shards that any process can fly.
+#[pyclass(frozen, module = "tautline._native")]
+pub(crate) struct CampaignFolder(Folder);
+
+#[pymethods]
+impl CampaignFolder {
+    /// Opens the campaign of a folder.
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let program = Program::running().map_err(Failure::into_exception)?;
+        let mut raised = None;
+        // `Folder::open` calls this at most once.
+        let law = std::cell::RefCell::new(&mut raised);
+        let load = |name: &str| {
+            name.contains(':').then(|| {
+                load_law(py, name).map_err(|error| {
+                    let failure = Failure::input("request/python-law", error.to_string(), "mend the module");
+                    **law.borrow_mut() = Some(error);
+                    failure
+                })
+            })
+        };
+        let opened = Folder::open(&path, &program, &load);
+        match raised {
+            Some(raised) => Err(raised),
+            None => opened.map(Self).map_err(Failure::into_exception),
+        }
+    }
+
+    /// Plans a campaign into its folder, or opens the campaign that is there.
+    #[staticmethod]
+    fn plan(plan: CampaignPlan<'_>) -> PyResult<Self> {
+        plan.request()?.plan().map(Self).map_err(Failure::into_exception)
+    }
+
+    #[getter]
+    fn path(&self) -> PathBuf {
+        self.0.path().to_owned()
+    }
+
+    /// Name, number of runs, number of shards, and name of the external law.
+    #[getter]
+    fn manifest(&self) -> (&str, u64, u64, Option<&str>) {
+        let manifest = self.0.campaign().manifest();
+        (&manifest.name, manifest.runs, manifest.shards, manifest.external_law.as_deref())
+    }
+
+    /// Returns the shards that are not flown, in order.
+    fn missing(&self, py: Python<'_>) -> PyResult<Vec<u64>> {
+        let missing = py.detach(|| self.0.missing()).map_err(Failure::into_exception)?;
+        Ok(missing.into_iter().map(|(shard, _)| shard).collect())
+    }
+
+    /// Returns whether the flown shards give the answer.
+    fn has_answer(&self, py: Python<'_>) -> bool {
+        py.detach(|| self.0.summary().is_ok())
+    }
+
+    /// Flies shards.
+    fn fly(&self, py: Python<'_>, shards: Vec<u64>, threads: usize, progress: Option<Py<PyAny>>) -> PyResult<()> {
+        let has_law = self.0.campaign().external_law().is_some();
+        let fly = |monitor: &dyn Monitor| tautline::campaign::fly_shards(&self.0, &shards, threads, monitor);
+        if answered(py, has_law, progress, fly)? { Ok(()) } else { Err(internal_error("the work was interrupted")) }
+    }
+
+    /// Merges all shards into the answer.
+    fn merge(&self, py: Python<'_>, worst: usize, progress: Option<Py<PyAny>>) -> PyResult<Answer> {
+        let has_law = self.0.campaign().external_law().is_some();
+        let merge = |monitor: &dyn Monitor| tautline::campaign::merge(&self.0, worst, &(), monitor);
+        answer_of(&whole(answered(py, has_law, progress, merge)?)?)
+    }
 }
 
 /// Returns share, lower and upper bound of `count` of `of` (Clopper and Pearson, 95 %).

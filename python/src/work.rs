@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -73,6 +73,16 @@ pub(crate) fn run_in_thread<T: Send>(
     interrupted: &Arc<AtomicBool>,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
+    run_in_thread_watched(py, interrupted, &|py| py.check_signals(), work)
+}
+
+/// As [`run_in_thread`], but calls `watch` on this thread, with the lock, and ends the work where it raises.
+fn run_in_thread_watched<T: Send>(
+    py: Python<'_>,
+    interrupted: &Arc<AtomicBool>,
+    watch: &dyn Fn(Python<'_>) -> PyResult<()>,
+    work: impl FnOnce() -> T + Send,
+) -> PyResult<T> {
     let is_done = AtomicBool::new(false);
     let mut raised = None;
     let done = thread::scope(|scope| {
@@ -86,9 +96,9 @@ pub(crate) fn run_in_thread<T: Send>(
         let worker = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, guarded)?;
         while !is_done.load(Ordering::Acquire) {
             py.detach(|| thread::park_timeout(SIGNALS_EVERY));
-            if let Err(signal) = py.check_signals() {
+            if let Err(error) = watch(py) {
                 interrupted.store(true, Ordering::Relaxed);
-                raised = Some(signal);
+                raised = Some(error);
             }
         }
         PyResult::Ok(py.detach(|| worker.join()).unwrap_or_else(Err))
@@ -107,14 +117,16 @@ pub(crate) fn run_detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + S
     started(finished(py.detach(|| catch_unwind(AssertUnwindSafe(with_threads))))?)
 }
 
-/// As [`run_in_thread`], for work that uses rayon. A fork gets a new pool, so that concurrent calls cannot block it.
-pub(crate) fn run_in_thread_with_pool<T: Send>(
+/// As [`run_in_thread`], for a study, which uses rayon and reports its progress. A fork gets a new pool, so that
+/// concurrent calls cannot block it.
+pub(crate) fn run_study<T: Send>(
     py: Python<'_>,
-    interrupted: &Arc<AtomicBool>,
+    monitor: &StudyMonitor,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
     let with_threads = || if is_original_process() { Ok(work()) } else { new_pool(0).map(|pool| pool.install(work)) };
-    started(run_in_thread(py, interrupted, with_threads)?)
+    let watch = |py: Python<'_>| py.check_signals().and_then(|()| monitor.report(py));
+    started(run_in_thread_watched(py, &monitor.interruption, &watch, with_threads)?)
 }
 
 /// Whether this process imported the package, instead of being a fork of that process.
@@ -145,32 +157,65 @@ fn words(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it panicked".to_owned())
 }
 
-/// Monitor of work on the calling thread: signals interrupt the work.
-pub(crate) struct SignalMonitor {
+/// Monitor of a study, which a function in Python may receive.
+pub(crate) struct StudyMonitor {
     interruption: Arc<AtomicBool>,
-    signals: Mutex<Signals>,
+    /// Units of work that are done, and their expected number; 0 if it is unknown.
+    done: AtomicU64,
+    total: AtomicU64,
+    /// Function that takes both, and the pair that it took last.
+    progress: Option<Py<PyAny>>,
+    reported: Mutex<(u64, u64)>,
+    /// Check for signals, where the work holds the calling thread.
+    signals: Option<Mutex<Signals>>,
 }
 
-impl SignalMonitor {
-    pub(crate) fn new() -> Self {
-        Self { interruption: Arc::default(), signals: Mutex::new(Signals::new()) }
+impl StudyMonitor {
+    /// Returns the monitor of work in another thread, or of work on the calling thread, which signals interrupt.
+    pub(crate) fn new(progress: Option<Py<PyAny>>, on_calling_thread: bool) -> Self {
+        let signals = on_calling_thread.then(|| Mutex::new(Signals::new()));
+        let (done, total, reported) = (AtomicU64::new(0), AtomicU64::new(0), Mutex::default());
+        Self { interruption: Arc::default(), done, total, progress, reported, signals }
     }
 
-    /// Returns the exception that a signal raised.
+    /// Calls the function of the progress if that has changed.
+    pub(crate) fn report(&self, py: Python<'_>) -> PyResult<()> {
+        let Some(progress) = &self.progress else { return Ok(()) };
+        let now = (self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed));
+        let last = std::mem::replace(&mut *self.reported.lock().unwrap_or_else(PoisonError::into_inner), now);
+        if now == last {
+            return Ok(());
+        }
+        let total = (now.1 > 0).then_some(now.1);
+        progress.call1(py, (total.map_or(now.0, |total| total.min(now.0)), total)).map(drop)
+    }
+
+    /// Returns the exception that a signal or the function of the progress raised on the calling thread.
     pub(crate) fn raised(self) -> Option<PyErr> {
-        self.signals.into_inner().unwrap_or_else(PoisonError::into_inner).raised
+        self.signals?.into_inner().unwrap_or_else(PoisonError::into_inner).raised
     }
 }
 
-impl Monitor for SignalMonitor {
+impl Monitor for StudyMonitor {
     fn interruption(&self) -> &Arc<AtomicBool> {
         &self.interruption
     }
 
+    fn begin(&self, _task: &str, total: Option<u64>) {
+        self.done.store(0, Ordering::Relaxed);
+        self.total.store(total.unwrap_or(0), Ordering::Relaxed);
+    }
+
+    fn advance(&self, units: u64) {
+        self.done.fetch_add(units, Ordering::Relaxed);
+    }
+
     fn is_interrupted(&self) -> bool {
-        let mut signals = self.signals.lock().unwrap_or_else(PoisonError::into_inner);
-        if !signals.are_silent() {
-            self.interruption.store(true, Ordering::Relaxed);
+        if let Some(signals) = &self.signals {
+            let mut signals = signals.lock().unwrap_or_else(PoisonError::into_inner);
+            if !signals.are_silent_after(|py| self.report(py)) {
+                self.interruption.store(true, Ordering::Relaxed);
+            }
         }
         self.interruption.load(Ordering::Relaxed)
     }
@@ -190,8 +235,13 @@ impl Signals {
 
     /// Whether no signal has raised an exception.
     pub(crate) fn are_silent(&mut self) -> bool {
+        self.are_silent_after(|_| Ok(()))
+    }
+
+    /// As [`Signals::are_silent`]. Calls `work` with the lock at each check; its exception counts as well.
+    fn are_silent_after(&mut self, work: impl FnOnce(Python<'_>) -> PyResult<()>) -> bool {
         if self.raised.is_none() && self.looked.elapsed() >= SIGNALS_EVERY {
-            self.raised = Python::attach(|py| py.check_signals().err());
+            self.raised = Python::attach(|py| py.check_signals().and_then(|()| work(py)).err());
             self.looked = Instant::now();
         }
         self.raised.is_none()

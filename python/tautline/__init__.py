@@ -15,7 +15,7 @@ Vehicle numbers start at 0 in arrays and indices, and at 1 in names, pairs and m
 from ._answers import Answer, Comparison, Margin, Sweep
 from ._arguments import ReadOptions
 from ._audit import Audit, AuditOptions, ViolationError, audit
-from ._campaign import Campaign, Proportion, campaign, proportion
+from ._campaign import Campaign, CampaignFolder, Proportion, campaign, proportion
 from ._flight import Flight, fly
 from ._judgement import Fact, Finding
 from ._law import ControlLaw, Law
@@ -33,6 +33,7 @@ __all__ = [
     "Audit",
     "AuditOptions",
     "Campaign",
+    "CampaignFolder",
     "Check",
     "Comparison",
     "ControlLaw",

@@ -31,6 +31,7 @@ from ._arguments import (
     single_recording,
     with_files,
 )
+from ._frames import ParquetFrame, is_frame, to_seconds
 from ._judgement import Fact, Judgement
 from ._native import Error
 from ._pickles import sealed, unsealed
@@ -73,6 +74,8 @@ CHECKS: dict[str, Callable[[object, str], object]] = {
     "require_presence": boolean,
     "independent": boolean,
 }
+#: Problem of arguments that belong to arrays.
+NO_ARRAYS = "velocities, names: only for arrays, but a recording is given"
 #: Options that are files.
 FILES = ("obstacles", "fence", "plan", "config")
 
@@ -238,7 +241,7 @@ def audit(
 
     ``tl.audit(t, positions, delta=1.5)`` audits arrays.
 
-    * ``t``: (T,) times [s].
+    * ``t``: (T,) times [s], or ``datetime64`` or ``timedelta64``; dates count from the first instant.
     * ``positions``: (T, N, 3) or (T, N, 2) [m]. NaN in every axis means that the vehicle was not seen. ``notes`` names
       vehicles that were not seen from the first instant to the last.
     * Arrays of float64 are borrowed in any memory order, not copied: do not write to them during the call. Lists,
@@ -246,6 +249,9 @@ def audit(
     * ``layout``: order of the axes of ``positions`` and ``velocities``, such as ``"time,axis,vehicle"``.
     * ``velocities``: (T, N, 3) [m/s], which make ``motion="bounded"`` tighter.
     * ``names``: N names; numbers from 1 unless given.
+
+    ``tl.audit(frame, delta=1.5)`` audits a table of pandas, polars, pyarrow or DuckDB, long or wide, with the columns
+    and the options of reading of a file (docs/recordings.md). It imports pyarrow.
 
     ``tl.audit("flight.mcap")`` audits a file or folder, or with ``join=True`` a list of files with one vehicle each.
     These options control reading: `format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, skip_incomplete,
@@ -327,10 +333,13 @@ def perform(
     shown = {name: value if isinstance(value, list) else arguments[name] for name, value in given.items()} | read_as
     if positions is None:
         has_arrays = velocities is not None or names is not None
+        if not isinstance(t, np.ndarray) and is_frame(t):
+            return audit_frame(question, call_text("table", shown), t, read_as, files, has_arrays)
         return audit_files(question, call_text(repr(t), shown), t, read_as, files, has_arrays)
     if isinstance(t, (str, os.PathLike)):
         raise TypeError("t: times are needed beside positions, or a path alone")
-    times, places = exact_array(t, "t"), exact_array(positions, "positions")
+    seconds = to_seconds(t)
+    times, places = exact_array(t, "t") if seconds is None else seconds, exact_array(positions, "positions")
     speeds = None if velocities is None else exact_array(velocities, "velocities")
     layout = read_as.pop("layout", None)
     if layout is not None:
@@ -369,11 +378,29 @@ def audit_files(
     if isinstance(t, np.ndarray):
         raise TypeError("positions: an array (T, N, 3) is needed beside the times, or a path in their place")
     if has_arrays:
-        raise TypeError("velocities, names: only for arrays, but a recording is given")
+        raise TypeError(NO_ARRAYS)
     files, options = single_recording(paths(t, "t"), read_as), read_options(**read_as)
 
     def repeat(html: str | None = None) -> Outcome:
         return with_files(files + more_files, lambda: _native.audit_files(question, command, files, options, html))
+
+    return Audit.__new__(Audit)._restore(repeat(), repeat)
+
+
+def audit_frame(
+    question: _native.AuditOptions,
+    command: str,
+    frame: object,
+    read_as: Mapping[str, Any],
+    files: list[str],
+    has_arrays: bool,
+) -> Audit:
+    if has_arrays:
+        raise TypeError(NO_ARRAYS)
+    options, table = read_options(**read_as), ParquetFrame(frame)
+
+    def repeat(html: str | None = None) -> Outcome:
+        return with_files(files, lambda: _native.audit_table(question, command, str(table.path), options, html))
 
     return Audit.__new__(Audit)._restore(repeat(), repeat)
 

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Protocol
+import hashlib
+import importlib
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ._native import Error
 
 if TYPE_CHECKING:
     from ._native import Observation
@@ -61,3 +69,33 @@ def check_law(law: object) -> None:
         raise TypeError(f"law: a law is needed, not the class {law.__name__}; give {law.__name__}(...)")
     if not isinstance(name := getattr(law, "name", None), (str, type(None))):
         raise TypeError(f"law.name: must be a string, not {type(name).__name__}")
+
+
+def import_law(name: str) -> tuple[Callable[[], ControlLaw], str]:
+    """Returns a function that makes the law ``MODULE:CLASS``, and the SHA-256 of the file of the module.
+
+    The class, or function, is called without arguments. The module is searched in the working folder as well.
+    """
+    module_name, _, path = name.partition(":")
+    if not module_name or not path:
+        raise Error(f"law: MODULE:CLASS is needed, such as my_laws:Springs, got {name!r}")
+    if os.getcwd() not in sys.path and "" not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    module = importlib.import_module(module_name)
+    found: Any = module
+    for part in path.split("."):
+        if not hasattr(found, part):
+            raise Error(f"law: {module_name} has no {path}")
+        found = getattr(found, part)
+    if not callable(found):
+        raise Error(f"law: {name} must be a class, or a function that returns a law")
+    file = getattr(module, "__file__", None)
+    if file is None:
+        raise Error(f"law: {module_name} has no file that other processes can import")
+
+    def make() -> ControlLaw:
+        law: ControlLaw = found()
+        check_law(law)
+        return law
+
+    return make, hashlib.sha256(Path(file).read_bytes()).hexdigest()

@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -343,6 +343,22 @@ class ReadOptions:
 class AuditOptions:
     def __new__(cls, **options: object) -> AuditOptions: ...
 
+@final
+class CampaignFolder:
+    def __new__(cls, path: str) -> CampaignFolder: ...
+    @staticmethod
+    def plan(plan: dict[str, object]) -> CampaignFolder: ...
+    @property
+    def path(self) -> str: ...
+    @property
+    def manifest(self) -> tuple[str, int, int, str | None]: ...
+    def missing(self) -> list[int]: ...
+    def has_answer(self) -> bool: ...
+    def fly(
+        self, shards: Sequence[int], threads: int, progress: Callable[[int, int | None], object] | None
+    ) -> None: ...
+    def merge(self, worst: int, progress: Callable[[int, int | None], object] | None) -> _Answer: ...
+
 def attack(
     scenario: Scenario,
     law: object | None,
@@ -354,7 +370,7 @@ def attack(
     seeds: int,
     seed: int,
     out: str | None,
-    outputs: dict[str, str | bool | int | None],
+    outputs: dict[str, object],
 ) -> _Answer: ...
 def audit_arrays(
     question: AuditOptions,
@@ -369,18 +385,17 @@ def audit_arrays(
 def audit_files(
     question: AuditOptions, command: str, paths: Sequence[str], options: ReadOptions, html: str | None
 ) -> _AuditOutcome: ...
+def audit_table(
+    question: AuditOptions, command: str, table: str, options: ReadOptions, html: str | None
+) -> _AuditOutcome: ...
 def audit_in_rust(
     times: NDArray[np.float64], positions: NDArray[np.float64], delta_m: float
 ) -> tuple[float, float]: ...
 def campaign(
-    spec: str,
-    law: object | None,
-    out: str | None,
-    shards: int | None,
+    plan: dict[str, object],
     threads: int | None,
-    until_width: float | None,
-    until_decided: float | None,
     worst: int,
+    progress: Callable[[int, int | None], object] | None,
 ) -> tuple[_Answer, str]: ...
 def compare(
     scenario: Scenario,
@@ -388,7 +403,7 @@ def compare(
     shield: bool,
     runs: int,
     seed: int,
-    outputs: dict[str, str | bool | int | None],
+    outputs: dict[str, object],
 ) -> _Answer: ...
 def export(
     paths: Sequence[str],
@@ -415,7 +430,7 @@ def margin(
     scan: int,
     halvings: int,
     logarithmic: bool,
-    outputs: dict[str, str | bool | int | None],
+    outputs: dict[str, object],
 ) -> _Answer: ...
 def read(paths: Sequence[str], options: ReadOptions) -> Columns: ...
 def scenarios() -> list[str]: ...
@@ -427,7 +442,9 @@ def sweep(
     runs: int,
     seed: int,
     verdict: str,
-    outputs: dict[str, str | bool | int | None],
+    outputs: dict[str, object],
 ) -> _Answer: ...
-def validate(out: str, force: bool, threads: int | None) -> _Answer: ...
+def validate(
+    out: str, force: bool, threads: int | None, progress: Callable[[int, int | None], object] | None
+) -> _Answer: ...
 def proportion(count: int, of: int) -> tuple[float | None, float, float]: ...

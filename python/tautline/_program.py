@@ -28,6 +28,7 @@ from ._arguments import (
     with_files,
 )
 from ._law import ControlLaw, check_law
+from ._progress import Progress, to_report
 from ._scenario import Scenario, to_scenario
 
 if TYPE_CHECKING:
@@ -108,15 +109,21 @@ def names_and_laws(laws: object) -> list[str | ControlLaw]:
 
 
 def outputs(
-    csv: PathLike | None, latex: PathLike | None, html: PathLike | None, overwrite: bool, threads: int | None
-) -> dict[str, str | bool | int | None]:
-    """Returns the files and threads of a study."""
+    csv: PathLike | None,
+    latex: PathLike | None,
+    html: PathLike | None,
+    overwrite: bool,
+    threads: int | None,
+    progress: Progress,
+) -> dict[str, object]:
+    """Returns the files, threads and progress of a study."""
     return {
         "csv": optional_path(csv, "csv"),
         "latex": optional_path(latex, "latex"),
         "html": optional_path(html, "html"),
         "force": boolean(overwrite, "overwrite"),
         "threads": optional_count(threads, "threads"),
+        "progress": to_report(progress),
     }
 
 
@@ -133,6 +140,7 @@ def compare(
     html: PathLike | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    progress: Progress = None,
 ) -> Comparison:
     """Flies laws from the same starts, on all cores. ``answer.laws.to_pandas()`` has a row for each law.
 
@@ -148,7 +156,7 @@ def compare(
             shield=boolean(shield, "shield"),
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
-            outputs=outputs(csv, latex, html, overwrite, threads),
+            outputs=outputs(csv, latex, html, overwrite, threads, progress),
         )
     )
 
@@ -172,6 +180,7 @@ def margin(
     html: PathLike | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    progress: Progress = None,
 ) -> Margin:
     """Searches between ``start`` and ``stop`` for the two values of a key between which a verdict turns.
 
@@ -191,7 +200,7 @@ def margin(
             scan=count(scan, "scan"),
             halvings=count(halvings, "halvings"),
             logarithmic=boolean(log, "log"),
-            outputs=outputs(csv, latex, html, overwrite, threads),
+            outputs=outputs(csv, latex, html, overwrite, threads, progress),
         )
     )
 
@@ -210,6 +219,7 @@ def sweep(
     html: PathLike | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    progress: Progress = None,
 ) -> Sweep:
     """Flies a grid over one key or two, such as ``{"network.loss": np.linspace(0, 0.5, 11)}``.
 
@@ -230,7 +240,7 @@ def sweep(
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
             verdict=str(verdict),
-            outputs=outputs(csv, latex, html, overwrite, threads),
+            outputs=outputs(csv, latex, html, overwrite, threads, progress),
         )
     )
 
@@ -253,6 +263,7 @@ def attack(
     html: PathLike | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    progress: Progress = None,
 ) -> Answer:
     """Searches for the flight with the smallest separation.
 
@@ -281,13 +292,16 @@ def attack(
             seeds=count(seeds, "seeds"),
             seed=count(seed, "seed"),
             out=optional_path(out, "out"),
-            outputs=outputs(csv, latex, html, overwrite, threads),
+            outputs=outputs(csv, latex, html, overwrite, threads, progress),
         )
     )
 
 
-def validate(out: PathLike | None = None, *, overwrite: bool = False, threads: int | None = None) -> Answer:
+def validate(
+    out: PathLike | None = None, *, overwrite: bool = False, threads: int | None = None, progress: Progress = None
+) -> Answer:
     """Measures the claims of the paper and of tautline. Writes figures and a page into the folder ``out``, if given."""
     with tempfile.TemporaryDirectory() as folder:
         at = str(Path(folder) / "validate") if out is None else path(out, "out")
-        return Answer(*_native.validate(at, boolean(overwrite, "overwrite"), optional_count(threads, "threads")))
+        given = boolean(overwrite, "overwrite"), optional_count(threads, "threads"), to_report(progress)
+        return Answer(*_native.validate(at, *given))

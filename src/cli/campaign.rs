@@ -8,10 +8,11 @@ use super::Exit;
 use super::console::{self, Console, Terminal};
 use super::json::JsonArgument;
 use super::run::pictures;
+use tautline_core::option::PYTHON_LAW;
 use tautline_report::request::{Failure, Pictures, command_line};
 use tautline_studies::Study as _;
 use tautline_studies::campaign::{
-    self as study, CampaignRequest, Folder, Program, ReplayRequest, Summary, listed, parse,
+    self as study, CampaignRequest, Folder, LoadLaw, Program, ReplayRequest, Summary, listed, parse,
 };
 
 /// Arguments of `tautline campaign`.
@@ -54,6 +55,9 @@ struct SpecArguments {
     /// Stop when the interval of each law's share of clear flights does not contain P.
     #[arg(long, value_name = "P")]
     until_decided: Option<f64>,
+    /// Law in Python that flies every run; only in the program of the Python package, `python -m tautline`.
+    #[arg(long, value_name = "MODULE:CLASS")]
+    python_law: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -154,7 +158,7 @@ struct ReplayArguments {
     no_snapshots: bool,
 }
 
-pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
+pub(super) fn campaign(arguments: &CampaignArguments, load: &LoadLaw<'_>) -> Result<Exit, Failure> {
     match &arguments.command {
         CampaignCommand::Run(run) => {
             let request = CampaignRequest {
@@ -162,12 +166,13 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
                 shards: run.shards,
                 threads: run.threads.map(usize::from),
                 worst: run.answer.worst.into(),
-                ..run.spec.request()
+                ..run.spec.request(load)?
             };
             run.answer.run(|monitor| study::campaign(&request, &*run.answer.pictures(), monitor))
         }
         CampaignCommand::Plan(plan) => {
-            let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.spec.request() };
+            let request =
+                CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.spec.request(load)? };
             let folder = request.plan()?;
             let manifest = folder.campaign().manifest();
             let console = Console { data_on_stdout: false, quiet: false };
@@ -183,29 +188,29 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
             Ok(Exit::Good)
         }
         CampaignCommand::Shard(shard) => {
-            let folder = shard.folder.open()?;
+            let folder = shard.folder.open(load)?;
             let shards = parse(&shard.shard, folder.campaign().manifest().shards)?;
             let monitor = Terminal::new(Console { data_on_stdout: false, quiet: shard.quiet })?;
             Ok(Exit::good_if(study::fly_shards(&folder, &shards, shard.threads.into(), &monitor)?))
         }
         CampaignCommand::Missing(at) => {
             let monitor = Terminal::without_signals(Console { data_on_stdout: true, quiet: false });
-            let missing = study::missing_shards(&at.open()?, &monitor)?;
+            let missing = study::missing_shards(&at.open(load)?, &monitor)?;
             console::data(&if missing.is_empty() { String::new() } else { listed(&missing) + "\n" })?;
             Ok(Exit::good_if(missing.is_empty()))
         }
         CampaignCommand::Merge(AnswerArguments { folder, answer }) => {
-            let folder = folder.open()?;
+            let folder = folder.open(load)?;
             answer.run(|monitor| study::merge(&folder, answer.worst.into(), &*answer.pictures(), monitor))
         }
         CampaignCommand::Report(AnswerArguments { folder, answer }) => {
-            let folder = folder.open()?;
+            let folder = folder.open(load)?;
             answer.run(|monitor| study::report(&folder, answer.worst.into(), &*answer.pictures(), monitor))
         }
         CampaignCommand::Replay(replay) => {
             let request =
                 ReplayRequest { run: replay.run, law: replay.law.clone(), bad: replay.bad, out: replay.out.clone() };
-            let folder = replay.folder.open()?;
+            let folder = replay.folder.open(load)?;
             let monitor = Terminal::new(Console { data_on_stdout: false, quiet: false })?;
             Ok(Exit::good_if(study::replay(&folder, &request, &*pictures("best", !replay.no_snapshots), &monitor)?))
         }
@@ -213,18 +218,25 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
 }
 
 impl SpecArguments {
-    fn request(&self) -> CampaignRequest {
-        CampaignRequest {
+    fn request(&self, load: &LoadLaw<'_>) -> Result<CampaignRequest, Failure> {
+        let external_law = self.python_law.as_deref().map(|name| {
+            load(name).unwrap_or_else(|| {
+                let problem = format!("{}: this program cannot import laws in Python", PYTHON_LAW.set(name));
+                Err(Failure::input("request/python-law", problem, "use the program of the Python package"))
+            })
+        });
+        Ok(CampaignRequest {
             until_width: self.until_width,
             until_decided: self.until_decided,
+            external_law: external_law.transpose()?,
             ..CampaignRequest::new(self.spec.clone())
-        }
+        })
     }
 }
 
 impl FolderArguments {
-    fn open(&self) -> Result<Folder, Failure> {
-        Folder::open(&self.folder, &Program::running()?)
+    fn open(&self, load: &LoadLaw<'_>) -> Result<Folder, Failure> {
+        Folder::open(&self.folder, &Program::running()?, load)
     }
 }
 

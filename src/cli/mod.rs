@@ -38,6 +38,7 @@ use console::Exit;
 use tautline_core::option::{Opt, spell_with};
 use tautline_recordings::read;
 use tautline_report::request::{Failure, command_line};
+use tautline_studies::campaign::LoadLaw;
 
 /// Runs the program with the arguments of the process.
 #[must_use]
@@ -48,6 +49,12 @@ pub fn main() -> ExitCode {
 /// Runs the program with arguments, beginning with its own name, and returns the exit code.
 #[must_use]
 pub fn entry(arguments: &[OsString]) -> u8 {
+    entry_with(arguments, &|_| None)
+}
+
+/// Runs the program as [`entry`]. `load` loads external laws of campaigns by their names.
+#[must_use]
+pub fn entry_with(arguments: &[OsString], load: &LoadLaw<'_>) -> u8 {
     quiet_guarded_panics();
     spell_with(as_argument);
     if completions::answer(arguments) {
@@ -79,7 +86,7 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     } {
         drawing::silence_driver();
     }
-    dispatch(command, &line).unwrap_or_else(|failure| console::show(&failure)) as u8
+    dispatch(command, &line, load).unwrap_or_else(|failure| console::show(&failure)) as u8
 }
 
 /// Fly formations of vehicles in a rigid-body engine and prove that no two come too close.
@@ -176,8 +183,8 @@ fn quiet_guarded_panics() {
     });
 }
 
-/// Runs a command. `line` is the whole command line.
-fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
+/// Runs a command. `line` is the whole command line, and `load` loads external laws.
+fn dispatch(command: Command, line: &str, load: &LoadLaw<'_>) -> Result<Exit, Failure> {
     match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Audit(arguments) => audit::audits(&arguments, line),
@@ -187,7 +194,7 @@ fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
         Command::Compare(arguments) => arguments.run(),
         Command::Margin(arguments) => arguments.run(),
         Command::Sweep(arguments) => arguments.run(),
-        Command::Campaign(arguments) => campaign::campaign(&arguments),
+        Command::Campaign(arguments) => campaign::campaign(&arguments, load),
         Command::Attack(arguments) => arguments.run(),
         Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]

@@ -181,6 +181,7 @@ options! {
     PLAN_DELAY = "plan-delay" "plan_delay" Number;
     POSITION_ERROR = "position-error" "position_error" Number;
     PROOF = "proof" "proof" Number;
+    PYTHON_LAW = "python-law" "law" Word;
     RADIUS = "radius" "radius" NamedNumber;
     REQUIRE_PRESENCE = "require-presence" "require_presence" Flag;
     RULES = "rules" "rules" Word;

@@ -8,11 +8,12 @@ use tautline_laws::law::{Law, ParameterError};
 
 /// Law from outside the scenario, such as a law in Python, that flies in place of the scenario's own law.
 ///
-/// Every flight gets a clone of the law. A certificate and rates are those that the law itself returns.
+/// A certificate and rates are those that the law itself returns.
 #[derive(Clone)]
 pub struct ExternalLaw {
     name: String,
     requires_calling_thread: bool,
+    source_sha256: Option<String>,
     make: Arc<dyn Fn() -> Box<dyn Law> + Send + Sync>,
 }
 
@@ -21,7 +22,20 @@ impl ExternalLaw {
     #[must_use]
     pub fn new(law: impl Law + Clone + Sync + 'static) -> Self {
         let (name, requires_calling_thread) = (law.name().to_owned(), law.capabilities().requires_calling_thread);
-        Self { name, requires_calling_thread, make: Arc::new(move || Box::new(law.clone())) }
+        Self { name, requires_calling_thread, source_sha256: None, make: Arc::new(move || Box::new(law.clone())) }
+    }
+
+    /// Returns the same law, but `make` makes the law of each flight, from a source with this SHA-256. Other processes
+    /// that load the law by its name compare it.
+    #[must_use]
+    pub fn from_source(self, sha256: String, make: impl Fn() -> Box<dyn Law> + Send + Sync + 'static) -> Self {
+        Self { source_sha256: Some(sha256), make: Arc::new(make), ..self }
+    }
+
+    /// Returns the SHA-256 of the source from which every process makes the law.
+    #[must_use]
+    pub fn source_sha256(&self) -> Option<&str> {
+        self.source_sha256.as_deref()
     }
 
     /// Returns the name of the law.

@@ -162,7 +162,7 @@ fn allocations_of_worlds(name: &str, sets: &[&str], (before, steps): (u64, u64),
 }
 
 pub(crate) fn worlds_allocate_nothing_per_step() {
-    // The crowd searches near pairs by cells. It stalls after 190 steps, and its spread slots are supervised from then on.
+    // The crowd searches near pairs by cells. It stalls after 190 steps; from then on its spread slots are supervised.
     let crowd = &["swarm.count=200"][..];
     let cases = [("pentagon", &[][..], 5, true), ("pentagon", &[], 5, false), ("thousand", crowd, 220, true)];
     for (name, sets, before, is_given) in cases {

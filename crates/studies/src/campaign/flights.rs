@@ -22,6 +22,8 @@ use tautline_sim::scenario::{ExternalLaw, Override, Scenario, ScenarioError, Sou
 pub const MOST_RUNS: u64 = 1_000_000_000;
 /// Default number of runs of a shard: the most that a failed machine loses.
 const RUNS_OF_A_SHARD: u64 = 250;
+/// Number of runs of a shard under a law that each process loads, which may be slow.
+const RUNS_UNDER_A_LOADED_LAW: u64 = 50;
 /// Most values of a list that are tried before the first flight.
 const MOST_TRIED: usize = 1000;
 /// Number of first runs that are searched for one that can be flown.
@@ -57,8 +59,9 @@ pub struct Law {
 }
 
 impl Campaign {
-    /// Plans a campaign with a name and a number of shards, by default one for each `RUNS_OF_A_SHARD` runs. The path
-    /// of a scenario is relative to `folder`. An external law flies every run in place of the scenario's own law.
+    /// Plans a campaign with a name and a number of shards, by default one for each `RUNS_OF_A_SHARD` runs, or for each
+    /// `RUNS_UNDER_A_LOADED_LAW` runs under an external law with a source. The path of a scenario is relative to
+    /// `folder`. An external law flies every run in place of the scenario's own law.
     ///
     /// # Errors
     /// [`Failure`] for a wrong specification, and for the first value, law or run that cannot be flown.
@@ -88,11 +91,14 @@ impl Campaign {
             runs: runs(spec)?,
             runs_raised: false,
             external_law: external_law.map(|law| law.name().to_owned()),
+            external_law_sha256: external_law.and_then(ExternalLaw::source_sha256).map(str::to_owned),
             first: Vec::new(),
             shards: 1,
             folder: std::path::absolute(source.folder()).unwrap_or_else(|_| source.folder().to_owned()),
         };
-        manifest.shards = shards.unwrap_or_else(|| manifest.runs.div_ceil(RUNS_OF_A_SHARD));
+        let is_loaded = external_law.is_some_and(|law| law.source_sha256().is_some());
+        let runs_of_a_shard = if is_loaded { RUNS_UNDER_A_LOADED_LAW } else { RUNS_OF_A_SHARD };
+        manifest.shards = shards.unwrap_or_else(|| manifest.runs.div_ceil(runs_of_a_shard));
         if manifest.shards == 0 || manifest.shards > manifest.runs {
             let (runs, shards) = (manifest.runs, manifest.shards);
             let problem = format!("{}: must be from 1 to {runs}, the number of runs", SHARDS.set(shards));
@@ -421,13 +427,24 @@ impl Campaign {
 
 /// Refuses an external law that is not the one that a manifest names.
 fn check_external_law(manifest: &Manifest, path: &Path, given: Option<&ExternalLaw>) -> Result<(), Failure> {
+    let source = given.and_then(ExternalLaw::source_sha256);
     let (planned, given) = (manifest.external_law.as_deref(), given.map(ExternalLaw::name));
     if planned == given {
-        return Ok(());
+        if manifest.external_law_sha256.as_deref() == source {
+            return Ok(());
+        }
+        let [there, here] = [manifest.external_law_sha256.as_deref(), source].map(|sha256| sha256.unwrap_or("none"));
+        let law = planned.unwrap_or_default();
+        let problem = format!("the source of the law `{law}` has the SHA-256 {here} here, and {there} in the manifest");
+        let remedy = "use the same file on all machines, or plan the campaign again into another folder";
+        return Err(other_campaign(path, problem, remedy));
     }
     let named = |law: Option<&str>| law.map_or_else(|| "the law of its scenario".to_owned(), |law| format!("`{law}`"));
     let problem = format!("the campaign flies {}, and this is {}", named(planned), named(given));
     let remedy = match planned {
+        Some(law) if manifest.external_law_sha256.is_some() => {
+            format!("use the program of the Python package, which imports `{law}`: python -m tautline campaign ...")
+        }
         Some(law) => format!("continue the campaign in Python: tautline.campaign(..., law={law}(...))"),
         None => "continue without an external law, or give another folder".to_owned(),
     };

@@ -22,6 +22,7 @@ use tautline_core::option::{OUT, SHARD, SHARDS};
 use tautline_core::record::{hex, sha256_hex};
 use tautline_core::text::counted;
 use tautline_report::request::command_line;
+use tautline_sim::scenario::ExternalLaw;
 
 /// File name of the table in the folder of a campaign.
 pub const RESULTS: &str = "results.parquet";
@@ -84,13 +85,15 @@ impl Folder {
         Self { path: path.to_owned(), campaign }
     }
 
-    /// Opens the campaign in a folder. Campaigns with an external law can only be opened by [`Folder::plan`].
+    /// Opens the campaign in a folder. `load` loads the external law that its manifest names, if it names one.
     ///
     /// # Errors
-    /// As [`Manifest::read`] and [`Campaign::of`].
-    pub fn open(path: &Path, program: &Program) -> Result<Self, Failure> {
+    /// As [`Manifest::read`] and [`Campaign::of`], and the failure of `load`.
+    pub fn open(path: &Path, program: &Program, load: &LoadLaw<'_>) -> Result<Self, Failure> {
         let file = if path.is_file() { path.to_owned() } else { path.join("manifest.json") };
-        let campaign = Campaign::of(Manifest::read(&file, program)?, path, None)?;
+        let manifest = Manifest::read(&file, program)?;
+        let law = manifest.external_law.as_deref().and_then(load).transpose()?;
+        let campaign = Campaign::of(manifest, path, law.as_ref())?;
         let folder = if path.is_file() { path.parent().unwrap_or(Path::new("")) } else { path };
         Ok(Self { path: folder.to_owned(), campaign })
     }
@@ -387,6 +390,9 @@ pub struct Manifest {
     /// Name of the external law that flies every run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub external_law: Option<String>,
+    /// SHA-256 of the source from which every process makes the external law.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub external_law_sha256: Option<String>,
     /// SHA-256 of the resolved scenario of run 0 under each law. It detects changes in files that the scenario names.
     pub first: Vec<String>,
     /// Number of parts into which the runs are split.
@@ -394,6 +400,9 @@ pub struct Manifest {
     /// Folder to which paths in the scenario are relative.
     pub folder: PathBuf,
 }
+
+/// Loads the external law of a name; `None` where this program cannot load laws of this kind.
+pub type LoadLaw<'a> = dyn Fn(&str) -> Option<Result<ExternalLaw, Failure>> + 'a;
 
 /// Identity of a program.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -456,13 +465,14 @@ impl Manifest {
             first,
             runs_raised,
             external_law,
+            external_law_sha256,
             ..
         } = self;
         let (version, runs) = (schema_version.to_string(), runs.to_string());
         let texts = [&version, name, &tool.sha256, scenario_name, scenario, spec, &runs];
         let mut hash = Sha256::new();
         let raised = runs_raised.then(|| "raised".to_owned());
-        for text in texts.into_iter().chain(first).chain(&raised).chain(external_law) {
+        for text in texts.into_iter().chain(first).chain(&raised).chain(external_law).chain(external_law_sha256) {
             // Lengths separate the texts, so that different texts do not give the same bytes.
             hash.update((text.len() as u64).to_le_bytes());
             hash.update(text);
@@ -557,6 +567,10 @@ pub(super) fn remove_if_present(path: &Path) -> Result<(), Failure> {
 mod tests {
     use super::*;
     use crate::campaign::Spec;
+    use tautline_core::swarm::Rows;
+    use tautline_laws::law::{Law, LawError};
+    use tautline_laws::observation::Observation;
+    use tautline_sim::scenario::{Scenario, Source};
 
     #[test]
     fn another_program_is_refused() {
@@ -566,10 +580,48 @@ mod tests {
         let program = Program::running().expect("a program");
         let campaign = Campaign::plan(&spec, "one", Path::new("."), None, program.clone(), None).expect("a plan");
         let folder = Folder::plan(folder.path(), campaign, false).expect("planned");
-        Folder::open(folder.path(), &program).expect("the same program");
+        Folder::open(folder.path(), &program, &|_| None).expect("the same program");
         let other = Program { sha256: "0".repeat(64), ..program };
-        let refused = Folder::open(folder.path(), &other).expect_err("another program").to_string();
+        let refused = Folder::open(folder.path(), &other, &|_| None).expect_err("another program").to_string();
         assert!(refused.contains("planned by") && refused.contains("use the same program"), "{refused}");
+    }
+
+    #[test]
+    fn a_law_from_another_source_is_refused() {
+        let law = |sha256: &str| {
+            let own = Scenario::read(&Source::Builtin("pentagon-laplacian".to_owned()), &[]).expect("a scenario");
+            let law = own.law().expect("a law");
+            ExternalLaw::new(Named(law.clone())).from_source(sha256.to_owned(), move || Box::new(Named(law.clone())))
+        };
+        let folder = tempfile::tempdir().expect("a folder");
+        let spec = Spec::read("spec.toml", "scenario = 'pentagon'\nruns = 60").expect("read");
+        let program = Program::running().expect("a program");
+        let (place, planned) = (Path::new("."), law("a"));
+        let campaign = Campaign::plan(&spec, "one", place, None, program.clone(), Some(&planned)).expect("a plan");
+        assert_eq!(campaign.manifest().shards, 2);
+        Folder::plan(folder.path(), campaign, false).expect("planned");
+        let open = |load: &LoadLaw<'_>| Folder::open(folder.path(), &program, load).map_err(|error| error.to_string());
+        open(&|name| (name == "m:Law").then(|| Ok(law("a")))).expect("the same law");
+        let refused = open(&|_| Some(Ok(law("b")))).expect_err("another source");
+        assert!(refused.contains("has the SHA-256 b here, and a in the manifest"), "{refused}");
+        let refused = open(&|_| None).expect_err("no law");
+        assert!(refused.contains("which imports `m:Law`: python -m tautline campaign"), "{refused}");
+        let failed = open(&|_| Some(Err(Failure::input("request/python-law", "no module", "give one"))));
+        assert!(failed.expect_err("no module").contains("no module"));
+    }
+
+    /// A law with a name that is imported.
+    #[derive(Clone)]
+    struct Named(Box<dyn Law>);
+
+    impl Law for Named {
+        fn name(&self) -> &'static str {
+            "m:Law"
+        }
+
+        fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+            self.0.command(at, command)
+        }
     }
 
     #[test]

@@ -18,7 +18,7 @@ mod tally;
 mod vary;
 
 pub use flights::{Campaign, Law, MOST_RUNS};
-pub use folder::{ANSWER, Folder, Manifest, Program, RESULTS, listed, parse};
+pub use folder::{ANSWER, Folder, LoadLaw, Manifest, Program, RESULTS, listed, parse};
 pub use replay::{ReplayRequest, WorstFlight, replay};
 pub use request::{CampaignRequest, MOST_WORST, campaign, fly_shards, merge, missing_shards, report};
 pub use shard::{PartState, Row, Shard};

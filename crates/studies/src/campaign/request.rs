@@ -27,6 +27,8 @@ pub const MOST_WORST: usize = 10;
 pub struct CampaignRequest {
     /// The file of the specification.
     pub spec: PathBuf,
+    /// Text of the specification, in the place of that of the file.
+    pub text: Option<String>,
     /// Stop as soon as the interval of each law's share of clear flights is at most this wide.
     pub until_width: Option<f64>,
     /// Stop as soon as the interval of each law's share of clear flights does not contain this share.
@@ -49,6 +51,7 @@ impl CampaignRequest {
     pub fn new(spec: PathBuf) -> Self {
         Self {
             spec,
+            text: None,
             until_width: None,
             until_decided: None,
             out: None,
@@ -73,7 +76,7 @@ impl CampaignRequest {
     /// Reads the specification and adds the keys of the request.
     fn read(&self) -> Result<Spec, Failure> {
         let shown = self.spec.display().to_string();
-        let text = fs::read_to_string(&self.spec).map_err(|error| {
+        let text = self.text.clone().map_or_else(|| fs::read_to_string(&self.spec), Ok).map_err(|error| {
             Failure::input(
                 "campaign/cannot-read",
                 format!("cannot read {shown}: {error}"),
@@ -152,7 +155,7 @@ pub fn campaign(
 /// # Errors
 /// As [`Folder::fly`].
 pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn Monitor) -> Result<bool, Failure> {
-    let batch = Batch::new(Some(threads), monitor)?;
+    let batch = Batch::for_laws(Some(threads), monitor, folder.campaign().external_law())?;
     let manifest = folder.campaign().manifest();
     let runs = shards.iter().map(|&shard| manifest.range(shard)).map(|range| range.end - range.start).sum();
     monitor.begin(&manifest.name, Some(folder.campaign().steps(runs)));
