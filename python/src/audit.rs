@@ -144,9 +144,10 @@ pub(crate) fn audit_table(
 ) -> PyResult<AuditOutcome> {
     const NAME: &str = "table";
     let monitor = Silent::default();
-    let open: &Open<'_> = &|| match read::open(&table, &options.0) {
-        Ok(recording) => Ok(Box::new(recording)),
-        Err(error) => Err(ReadError { file: NAME.to_owned(), ..error }),
+    let open: &Open<'_> = &|| {
+        read::open(&table, &options.0)
+            .map(|recording| recording as _)
+            .map_err(|error| ReadError { file: NAME.to_owned(), ..error })
     };
     let subject = Subject::InMemory { name: NAME, own: None, open };
     let request = AuditRequest { command: command.to_owned(), html, ..AuditRequest::new(subject, question.0.clone()) };
