@@ -85,10 +85,8 @@ def export(
 
 
 def study_scenario(scenario: Scenario | PathLike, set: Mapping[str, Any] | None) -> _native.Scenario:
-    """Returns the scenario of a study. Raises :class:`Error` where its file has changed."""
-    found = to_scenario(scenario, set)
-    found._check_unchanged()
-    return found._native
+    """Returns the scenario of a study."""
+    return to_scenario(scenario, set)._native
 
 
 def checked_law(law: ControlLaw | None) -> ControlLaw | None:

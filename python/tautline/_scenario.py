@@ -54,7 +54,7 @@ class Scenario:
         self.files: tuple[str, ...] = tuple(files)
 
     def _check_unchanged(self) -> None:
-        """Raises where the file has changed or is missing: studies would read the changed file."""
+        """Raises where the file has changed or is missing: a flight would not be that of the file."""
         if not self.files:
             return
         now = with_files(self.files, lambda: _native.Scenario(self._source, self._is_text, self._sets))
@@ -154,12 +154,13 @@ class Scenario:
 
 
 def to_scenario(given: Scenario | PathLike, set: Mapping[str, Any] | None = None) -> Scenario:
-    """Returns a scenario, or reads it by its name or path, with overrides."""
+    """Returns a scenario, or reads it by its name or path, with overrides. Every call that flies or checks a scenario
+    gets it here: one whose file has changed since is refused."""
     if not isinstance(given, Scenario):
         return Scenario(given, set=set)
+    given._check_unchanged()
     if not set:
         return given
-    given._check_unchanged()
     sets = [f"{key}={to_toml_value(value)}" for key, value in mapping(set, "set").items()]
     return restore(given._source, given._is_text, given._sets + sets, given.files)
 
@@ -203,9 +204,18 @@ class CheckWarning(Row):
     message: str
 
 
+class PredictedMargin(Row):
+    """Predicted tolerance of the formation to an imperfection. ``value`` is None where every value is tolerated."""
+
+    key: str
+    state: str
+    bound: str
+    value: float | None
+
+
 class Check(Answer):
     """Check of a scenario before the first step, with the keys of ``tautline check --json``. It is good if it does not
-    refuse the flight."""
+    refuse the flight. Its tables are ``warnings``, ``margins`` and ``certificate_void``."""
 
     #: Certified smallest separation [m]; None without a certificate.
     certified_m: float | None
@@ -213,6 +223,8 @@ class Check(Answer):
     certificate_void: Rows[Statement]
     #: Warnings, the worst one first.
     warnings: Rows[CheckWarning]
+    #: Predicted tolerances, without a shield and without models of vehicles.
+    margins: Rows[PredictedMargin]
 
     def _repr_html_(self) -> str:
         rows = [(warning.code, warning.message) for warning in self.warnings]

@@ -286,7 +286,18 @@ class WrongInput(Case):
         file.write_text(tl.Scenario("pentagon").to_toml())
         scenario = tl.Scenario(file)
         file.write_text(tl.Scenario("pentagon", set={"time.duration_s": 50}).to_toml())
-        self.refuses(tl.Error, "has changed since it was read", lambda: tl.VectorSimulation(scenario, 2))
+        for use in (
+            lambda: tl.VectorSimulation(scenario, 2),
+            lambda: tl.Simulation(scenario),
+            lambda: tl.fly(scenario),
+            lambda: tl.fly(scenario, set={"time.duration_s": 1}),
+            lambda: tl.check(scenario),
+            lambda: tl.compare(scenario, ["laplacian"], runs=1),
+            lambda: tl.attack(scenario, start=0.1, flights=1),
+        ):
+            self.refuses(tl.Error, "has changed since it was read; create a new Scenario", use)
+        file.unlink()
+        self.refuses(FileNotFoundError, "own.toml", lambda: tl.fly(scenario))
 
 
 class Threads(Case):
