@@ -13,8 +13,9 @@ from . import _native
 from ._arguments import PathLike, boolean, exact_array
 from ._arguments import count as whole_number
 from ._native import Error
-from ._scenario import Scenario, to_scenario
+from ._scenario import Scenario, restore, to_scenario
 from ._simulation import Simulation
+from ._worlds_history import STOPPED, History, Saved
 
 
 class VectorSimulation:
@@ -36,6 +37,8 @@ class VectorSimulation:
     do not fly in that call. The next seed of a world is its seed plus ``num_envs``; seeds without a valid start are
     passed over, at most 1000 of them.
 
+    ``keep_history=True`` keeps the accelerations, so that worlds in flight can be saved and pickled.
+
     Raises :class:`Error` for a wrong scenario or a seed without a valid start.
     """
 
@@ -50,6 +53,7 @@ class VectorSimulation:
         seeds: Sequence[int] | NDArray[np.integer[Any]] | None = None,
         threads: int | None = None,
         autoreset: bool = False,
+        keep_history: bool = False,
         set: Mapping[str, Any] | None = None,
     ) -> None:
         self.scenario = to_scenario(scenario, set)
@@ -69,6 +73,8 @@ class VectorSimulation:
         )
         #: Whether a step resets the worlds that have ended.
         self.autoreset = bool(autoreset)
+        self._threads = threads
+        self._history = History(boolean(keep_history, "keep_history"), self.seeds.tolist())
 
     def step(
         self,
@@ -98,7 +104,14 @@ class VectorSimulation:
             commands = u
         elif u is not None:
             commands = exact_array(u, "u")
-        self._native.step(commands, min(int(steps), 2**63))
+        try:
+            self._native.step(commands, min(int(steps), 2**63))
+        except BaseException as problem:
+            # Wrong input moves no world. Otherwise some may have moved.
+            if self.autoreset or not isinstance(problem, (Error, TypeError)):
+                self._history.lose(STOPPED)
+            raise
+        self._history.add_step(commands, int(steps))
         if out is not None:
             out[..., :3], out[..., 3:] = self.positions, self.velocities
 
@@ -129,6 +142,7 @@ class VectorSimulation:
             p = self._rows(positions, "positions")
             starts = p, np.zeros_like(p) if velocities is None else self._rows(velocities, "velocities")
         self._native.reset(chosen, given, starts, self._is_environment)
+        self._history.add_reset(chosen, self.seeds.tolist(), starts)
 
     def _rows(self, given: ArrayLike, name: str) -> NDArray[np.float64]:
         """Returns a vector of three numbers for each vehicle of each world, with z = 0 where two are given."""
@@ -275,14 +289,78 @@ class VectorSimulation:
         """Returns an independent copy, which continues with the same bits."""
         copied = object.__new__(type(self))
         copied.__dict__.update(self.__dict__)
-        copied._native = self._native.copy()
+        copied._native, copied._history = self._native.copy(), self._history.copy()
         return copied
 
     def __deepcopy__(self, memo: dict[int, Any]) -> VectorSimulation:
         copied = copy.copy(self)
-        state = {name: value for name, value in self.__dict__.items() if name not in ("_native", "scenario")}
-        copied.__dict__.update(copy.deepcopy(state, memo))
+        copied.__dict__.update(copy.deepcopy(self._more(), memo))
         return copied
+
+    def _more(self) -> dict[str, Any]:
+        """Returns the attributes of a subclass and of its users."""
+        own = ("_native", "_history", "_threads", "scenario", "num_envs", "autoreset")
+        return {name: value for name, value in self.__dict__.items() if name not in own}
+
+    def save(self) -> bytes:
+        """Returns the worlds as bytes: the source of the scenario, and all accelerations and resets since the last reset
+        of all worlds. A file of the scenario must be there, unchanged, when they are loaded.
+
+        Raises :class:`Error` where worlds have flown since then, unless they were created with ``keep_history=True``,
+        and where the accelerations exceed 256 MiB.
+        """
+        about = {
+            "scenario": self.scenario._source_state(),
+            "num_envs": self.num_envs,
+            "threads": self._threads,
+            "autoreset": self.autoreset,
+            "is_environment": self._is_environment,
+        }
+        return self._history.saved(about, self._state())
+
+    @classmethod
+    def load(cls, data: bytes) -> VectorSimulation:
+        """Returns saved worlds, which continue with the same bits. The flight so far is flown again.
+
+        Raises :class:`Error` for damaged bytes, and for those of another program whose flight differs.
+        """
+        return VectorSimulation._loaded(cls, data, {})
+
+    @staticmethod
+    def _loaded(kind: type[VectorSimulation], data: bytes, more: dict[str, Any]) -> VectorSimulation:
+        saved = Saved(data)
+        about = saved.about
+        if about["is_environment"] != kind._is_environment:
+            raise Error("data: the worlds are those of an environment, whose policy is no part of them; pickle it")
+        loaded = object.__new__(kind)
+        loaded.__dict__.update(more)
+        loaded.scenario, loaded.num_envs = restore(*about["scenario"]), about["num_envs"]
+        loaded._threads, loaded.autoreset = about["threads"], about["autoreset"]
+        everyone = np.ones(loaded.num_envs, dtype=np.bool_)
+        for call, arrays in saved.calls():
+            if "steps" in call:
+                loaded.step(arrays[0] if arrays else None, steps=call["steps"])
+                continue
+            if not hasattr(loaded, "_native"):
+                loaded._native = _native.VectorSimulation(
+                    loaded.scenario._native, call["seeds"], loaded._threads or 0, loaded.autoreset, kind._is_environment
+                )
+                loaded._history = History(about["keeps_steps"], call["seeds"])
+                mask, starts = everyone, tuple(arrays)
+            else:
+                mask, starts = arrays[0], tuple(arrays[1:])
+            if starts or mask is not everyone:
+                given = {"positions": starts[0], "velocities": starts[1]} if starts else {}
+                loaded.reset(mask, call["seeds"], **given)
+        saved.check(loaded._state)
+        return loaded
+
+    def _state(self) -> NDArray[np.float64]:
+        """Returns the state that a loaded copy must have."""
+        return np.concatenate([self.positions.ravel(), self.velocities.ravel(), self.least_clearance_m])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return VectorSimulation._loaded, (type(self), self.save(), self._more())
 
     def __len__(self) -> int:
         return self.num_envs

@@ -63,12 +63,13 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         observe: Observes | None = None,
         reward: Rewards | None = None,
         shield: bool | None = None,
+        keep_history: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         set: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self.sim = Worlds(scenario, num_envs, threads=threads, shield=shield, set=set)
+        self.sim = Worlds(scenario, num_envs, threads=threads, shield=shield, keep_history=keep_history, set=set)
         self.actions = Actions(self.sim, hz, max_accel_m_s2)
         self.observe, observed = observations_of(observe, self.sim)
         self.reward: Rewards = Reward() if reward is None else reward
@@ -194,10 +195,11 @@ class FormationEnv(Rendered, gymnasium.Env[Observations, NDArray[np.float32]]):
         observe: Observes | None = None,
         reward: Rewards | None = None,
         shield: bool | None = None,
+        keep_history: bool = False,
         set: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self.sim = Worlds(scenario, 1, threads=1, shield=shield, set=set)
+        self.sim = Worlds(scenario, 1, threads=1, shield=shield, keep_history=keep_history, set=set)
         self.actions = Actions(self.sim, hz, max_accel_m_s2)
         self.observe, observed = observations_of(observe, self.sim)
         self.reward: Rewards = Reward() if reward is None else reward

@@ -47,6 +47,7 @@ class Worlds(VectorSimulation):
         *,
         threads: int | None = None,
         shield: bool | None = None,
+        keep_history: bool = False,
         set: Mapping[str, Any] | None = None,
     ) -> None:
         sets = dict(mapping(set, "set"))
@@ -57,7 +58,7 @@ class Worlds(VectorSimulation):
             key, what = part
             remedy = "give a scenario whose reference all vehicles know"
             raise Error(f"scenario: an environment does not support {key} of {wanted.name} ({what}); {remedy}")
-        super().__init__(wanted, num_envs, threads=threads)
+        super().__init__(wanted, num_envs, threads=threads, keep_history=keep_history)
         #: Axes of actions and observations: 2 in the plane z = 0, else 3.
         self.axes = 2 if wanted._native.is_plane else 3
         #: Seed of each world and its number among the worlds of this seed; None before the first episode.

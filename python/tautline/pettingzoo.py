@@ -51,10 +51,11 @@ class FormationEnv(Rendered, ParallelEnv):  # type: ignore[misc]
         observe: Observes | None = None,
         reward: Rewards | None = None,
         shield: bool | None = None,
+        keep_history: bool = False,
         set: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self.sim = Worlds(scenario, 1, threads=1, shield=shield, set=set)
+        self.sim = Worlds(scenario, 1, threads=1, shield=shield, keep_history=keep_history, set=set)
         self._actions = Actions(self.sim, hz, max_accel_m_s2)
         self.observe, observed = observations_of(observe, self.sim)
         self.reward: Rewards = Reward() if reward is None else reward
