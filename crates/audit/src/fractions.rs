@@ -34,5 +34,5 @@ fn a_number_is_its_fraction() {
     assert_eq!(exact(2_f64.powi(80) + 2_f64.powi(40)), power(80) + power(40));
     assert_eq!(exact(f64::from_bits(3)) * power(1074), Ratio::from_integer(BigInt::from(3)));
     assert_eq!(exact(f64::MIN_POSITIVE) * power(1022), power(0));
-    assert_eq!(exact(f64::MAX) + power(970), power(1024));
+    assert_eq!(exact(f64::MAX) + power(971), power(1024));
 }

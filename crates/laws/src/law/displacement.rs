@@ -87,8 +87,8 @@ impl Default for DisplacementKeys {
 /// the run. w~ is relative to the same frame as v~: without a reference, an acceleration common to all vehicles adds
 /// nothing.
 ///
-/// A change D of the slots, at once or along straight lines, raises `sqrt E` by at most
-/// `q(D) = sqrt(sigma k/2 tr(D' M D))`. The bound through all legs is therefore known before the first step.
+/// A change X of the slots, at once or along straight lines, raises `sqrt E` by at most
+/// `q(X) = sqrt(sigma k/2 tr(X^T M X))`. The bound through all legs is therefore known before the first step.
 ///
 /// # Ellipsoids
 /// If the keep-out region of a vehicle is an ellipsoid, `l_ij` is the scaled length of the [`Metric`], and so are R and

@@ -32,7 +32,7 @@ pub struct Source {
 /// Clock of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Clock {
-    /// The unit: `s`, `ms`, `us` or `ns`.
+    /// The unit: `s`, `ms`, `us` or `ns`; `given` where a factor was given.
     pub unit: String,
     /// Whether it was inferred from the numbers.
     pub inferred: bool,
