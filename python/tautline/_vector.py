@@ -303,8 +303,8 @@ class VectorSimulation:
         return {name: value for name, value in self.__dict__.items() if name not in own}
 
     def save(self) -> bytes:
-        """Returns the worlds as bytes: the source of the scenario, and all accelerations and resets since the last reset
-        of all worlds. A file of the scenario must be there, unchanged, when they are loaded.
+        """Returns the worlds as bytes: the source of the scenario, and all accelerations and resets since the last
+        reset of all worlds. A file of the scenario must be there, unchanged, when they are loaded.
 
         Raises :class:`Error` where worlds have flown since then, unless they were created with ``keep_history=True``,
         and where the accelerations exceed 256 MiB.

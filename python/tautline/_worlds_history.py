@@ -18,7 +18,7 @@ MAGIC, HASH = b"tautline worlds 1\n", 32
 #: Largest memory of the arrays of a history [bytes]; a longer history is dropped.
 MAX_BYTES = 256 << 20
 #: Reasons why worlds cannot be saved, with remedies.
-NOT_KEPT = "save: the worlds have flown and keep no history; give keep_history=True, or save after a reset of all worlds"
+NOT_KEPT = "save: worlds in flight keep no history; give keep_history=True, or save after a reset of all worlds"
 STOPPED = "save: a call failed after some worlds had moved; save after a reset of all worlds"
 TOO_LONG = "save: the accelerations since the last reset of all worlds exceed 256 MiB; save or reset more often"
 
@@ -90,7 +90,8 @@ class Saved:
         found = bytes(data)
         rest = found[len(MAGIC) + HASH :]
         if not found.startswith(MAGIC) or found[len(MAGIC) :][:HASH] != hashlib.sha256(rest).digest():
-            raise Error(f"data: these are no saved worlds, or damaged ones ({len(found)} bytes); give what save() returned")
+            wrong = f"these are no saved worlds, or damaged ones ({len(found)} bytes)"
+            raise Error(f"data: {wrong}; give what save() returned")
         with np.load(io.BytesIO(rest), allow_pickle=False) as arrays:
             self.about: dict[str, Any] = json.loads(str(arrays["header"]))
             self.state: NDArray[np.float64] = arrays["state"]

@@ -187,9 +187,9 @@ impl MarginArguments {
 /// Arguments of `tautline sweep`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 complete, for any result; 1 interrupted, or more runs refused than flown. A single run (--runs 1) changes \
-only the keys. With more runs, run k has start.seed and noise.seed = S + k, and a scenario without randomness gets a \
-small jitter of the start. See docs/studies.md.")]
+Exit codes: 0 complete, for any result; 1 interrupted, or more runs refused than flown. A single run (--runs 1) \
+changes only the keys. With more runs, run k has start.seed and noise.seed = S + k, and a scenario without randomness \
+gets a small jitter of the start. See docs/studies.md.")]
 pub(super) struct SweepArguments {
     #[command(flatten)]
     study: StudyArguments,

@@ -124,7 +124,8 @@ class Worlds(Case):
     def test_damaged_bytes_are_refused(self) -> None:
         saved = self.flown("pentagon", {}).save()
         for cut in range(0, len(saved), 997):
-            self.refuses(tl.Error, "data: these are no saved worlds", lambda cut=cut: tl.VectorSimulation.load(saved[:cut]))
+            part = saved[:cut]
+            self.refuses(tl.Error, "data: these are no saved worlds", lambda part=part: tl.VectorSimulation.load(part))
         for place in range(0, len(saved), 997):
             changed = bytearray(saved)
             changed[place] ^= 4
