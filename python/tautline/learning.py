@@ -59,6 +59,8 @@ class Worlds(VectorSimulation):
             remedy = "give a scenario whose reference all vehicles know"
             raise Error(f"scenario: an environment does not support {key} of {wanted.name} ({what}); {remedy}")
         super().__init__(wanted, num_envs, threads=threads, keep_history=keep_history)
+        #: Steps of the scenario for one action.
+        self.steps_of_action = 1
         #: Axes of actions and observations: 2 in the plane z = 0, else 3.
         self.axes = 2 if wanted._native.is_plane else 3
         #: Seed of each world and its number among the worlds of this seed; None before the first episode.
@@ -69,6 +71,12 @@ class Worlds(VectorSimulation):
     def violated(self) -> NDArray[np.bool_]:
         """(E,) whether each world has a violation so far."""
         return self.least_clearance_m < 0
+
+    @property
+    def actions_left(self) -> NDArray[np.int64]:
+        """(E,) number of actions up to the end of the scenario."""
+        left = self.scenario.steps - self.steps.astype(np.int64)
+        return np.asarray(-(-left // self.steps_of_action))
 
     def begin(
         self,
@@ -179,7 +187,11 @@ class Observation:
 
 
 class Reward:
-    """The distance of a vehicle to its present slot [m], negative, less ``violation`` for a violation of its world."""
+    """The distance of a vehicle to its present slot [m], negative.
+
+    An episode that is terminated, as by a violation, costs ``violation`` more, and the distance once more for each
+    action that is left. Without this, a violation could be worth more than a flight to the end.
+    """
 
     def __init__(self, *, violation: float = VIOLATION) -> None:
         self.violation = number(violation, "violation")
@@ -187,7 +199,8 @@ class Reward:
     def __call__(self, worlds: Worlds) -> NDArray[np.float64]:
         """Returns the rewards (E, N)."""
         errors_m = np.linalg.norm(worlds.slots_m - worlds.positions, axis=-1)
-        return np.asarray(-errors_m - self.violation * worlds.violated[:, None])
+        terminated, _ = worlds.ends()
+        return np.asarray(-errors_m - terminated[:, None] * (self.violation + errors_m * worlds.actions_left[:, None]))
 
 
 class Actions:
@@ -199,7 +212,7 @@ class Actions:
             if not 0 < value < np.inf:
                 raise Error(f"{name}: must be a finite number above 0, got {value}")
         #: Steps of the scenario for one action.
-        self.steps = steps_of_action(self.hz, worlds.scenario)
+        self.steps = worlds.steps_of_action = steps_of_action(self.hz, worlds.scenario)
 
     def commands(self, actions: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
         """Returns accelerations [m/s^2] of actions, which must have this shape."""

@@ -298,7 +298,13 @@ class Gymnasium(Case):
             _, rewards, terminated, *_ = vector.step(crash(vector, 0))
             if terminated.any():
                 break
-        self.assertTrue(-20 < rewards[0] < -7, rewards)
+        # The distances to the slots count once for this action and once for each action that is left.
+        sim = vector.sim
+        errors_m = np.linalg.norm(sim.slots_m - sim.positions, axis=-1)[0].mean()
+        left = (sim.scenario.steps - sim.steps[0]) / sim.steps_of_action
+        self.assertEqual(sim.actions_left[0], left)
+        expected = -7.0 - errors_m * (1 + left) - np.linalg.norm(sim.velocities[0], axis=-1).mean()
+        self.assertAlmostEqual(rewards[0], expected)
 
         class Wrong(Own):
             def size(self, worlds: Worlds) -> int:
