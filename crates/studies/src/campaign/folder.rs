@@ -589,7 +589,8 @@ mod tests {
     fn a_law_from_another_source_is_refused() {
         let law = |sha256: &str| ExternalLaw::new(Named).from_source(sha256.to_owned(), || Box::new(Named));
         let folder = tempfile::tempdir().expect("a folder");
-        let spec = Spec::read("spec.toml", "scenario = 'pentagon'\nruns = 60").expect("read");
+        let text = "scenario = 'pentagon'\nruns = 60\n[vary]\nstart.jitter_m = { uniform = [0.0, 0.1] }";
+        let spec = Spec::read("spec.toml", text).expect("read");
         let program = Program::running().expect("a program");
         let (place, planned) = (Path::new("."), law("a"));
         let campaign = Campaign::plan(&spec, "one", place, None, program.clone(), Some(&planned)).expect("a plan");
