@@ -106,10 +106,10 @@ fi
 
 # Build tool of the Python package, and packages for tests/python.
 if needed_by ci python; then
-    environment python \
-        'cma, gymnasium, ipykernel, joblib, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
-        'cma>=4,<5' gymnasium ipykernel joblib 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' \
-        'pandas>=1.5' pettingzoo pyarrow
+    used='cma, duckdb, gymnasium, ipykernel, joblib, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo'
+    environment python "$used, polars, pyarrow, tqdm" \
+        'cma>=4,<5' duckdb gymnasium ipykernel joblib 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient \
+        'numpy>=1.23' 'pandas>=1.5' pettingzoo polars pyarrow tqdm
 fi
 
 # Slurm for tests/cluster, which starts a node.

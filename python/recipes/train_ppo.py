@@ -1,7 +1,7 @@
 """Trains policies for three tasks with PPO, audits them, and flies them again under the shield.
 
-Usage: ``python train_ppo.py [TASK...] [--steps STEPS] [--seeds SEED...]``, for all tasks by default. It needs PyTorch and
-Stable-Baselines3 (``pip install stable-baselines3``, MIT). All vehicles share one policy: each of them is an
+Usage: ``python train_ppo.py [TASK...] [--steps STEPS] [--seeds SEED...]``, for all tasks by default. It needs PyTorch
+and Stable-Baselines3 (``pip install stable-baselines3``, MIT). All vehicles share one policy: each of them is an
 environment of Stable-Baselines3. A trained policy flies 200 episodes whose seeds the training has not used, without and
 with the shield. docs/learning.md has the results.
 """
@@ -28,8 +28,8 @@ Policy = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 HZ, ACCEL_M_S2 = 20.0, 2.0
 #: Number of nearest vehicles and obstacles that a vehicle observes.
 NEAREST = 4
-#: Worlds of the training, steps of single vehicles, and episodes of an evaluation.
-WORLDS, STEPS, EPISODES = 16, 3_000_000, 200
+#: Vehicles of the training in all worlds, steps of single vehicles, and episodes of an evaluation.
+VEHICLES, STEPS, EPISODES = 192, 3_000_000, 200
 #: Seed of the evaluation.
 UNSEEN = 10**9
 
@@ -106,7 +106,7 @@ class Nearest(Observation):
 
 
 class Arrive(Reward):
-    """exp(-d / 2 m) for the distance d to the slot, so that a flight without a violation is worth more than a short one.
+    """exp(-d / 2 m) for the distance d to the slot, so that a whole flight is worth more than a part.
 
     A violation costs a vehicle 20 if it is within 0.5 m of a limit, else 2. ``of_vehicles`` keeps the rewards.
     """
@@ -210,11 +210,12 @@ def train(task: str, steps: int = STEPS, seed: int = 0) -> Policy:
         """Every vehicle of every world as an environment."""
 
         def __init__(self) -> None:
-            self.env = environment(task, WORLDS, "SameStep")
+            worlds = VEHICLES // len(TASKS[task]())
+            self.env = environment(task, worlds, "SameStep")
             self.vehicles, size = self.env.single_observation_space.shape
             axes = self.env.single_action_space.shape[1]
             space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
-            super().__init__(WORLDS * self.vehicles, space, gymnasium.spaces.Box(-1.0, 1.0, (axes,), np.float32))
+            super().__init__(worlds * self.vehicles, space, gymnasium.spaces.Box(-1.0, 1.0, (axes,), np.float32))
 
         def reset(self) -> Any:
             observations, _ = self.env.reset(seed=seed)
@@ -273,15 +274,18 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1], help="seeds of the training")
     given = parser.parse_args(arguments)
     for task in given.tasks:
-        for shield in (False, True):
-            print(f"{task:9s} spring   {'shield' if shield else 'bare':6s} {evaluate(task, spring, shield)}", flush=True)
+        tell(task, "spring", spring)
         for seed in given.seeds:
             began = time.monotonic()
             policy = train(task, given.steps, seed)
-            print(f"{task:9s} seed {seed}   trained in {time.monotonic() - began:.0f} s", flush=True)
-            for shield in (False, True):
-                found = evaluate(task, policy, shield)
-                print(f"{task:9s} seed {seed}   {'shield' if shield else 'bare':6s} {found}", flush=True)
+            print(f"{task}, seed {seed}: trained in {time.monotonic() - began:.0f} s", flush=True)
+            tell(task, f"seed {seed}", policy)
+
+
+def tell(task: str, name: str, policy: Policy) -> None:
+    """Prints the evaluations of a policy without and with the shield."""
+    for shield in (False, True):
+        print(f"{task}, {name}{', shield' if shield else ''}: {evaluate(task, policy, shield)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -31,17 +31,21 @@ from ._arguments import (
     single_recording,
     with_files,
 )
-from ._frames import ParquetFrame, is_frame, to_seconds
-from ._judgement import Fact, Judgement
+from ._frames import ArrowTable, ParquetFrame, is_frame, to_seconds
+from ._judgement import Fact, Finding, Judgement
 from ._native import Error
 from ._pickles import sealed, unsealed
-from ._tables import OpenRow, Row, Rows
+from ._tables import Column, OpenRow, Row, Rows, Table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from typing_extensions import Unpack
 
     from ._words import Motion, Rules
 
+#: Times (K,) and positions (K, 3) of vehicles, by name.
+Tracks = Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 #: Verdict, headline, summary, the report as JSON, and whether each of its facts is an assumption.
 Outcome = tuple[str, str, str, str, list[bool]]
 
@@ -108,8 +112,13 @@ class EarlyEnd(Row):
     reason: str | None
 
 
-class Audit(Judgement):
-    """Result of an audit. :func:`audit` returns it. It can be pickled."""
+class Audit(Judgement, Table):
+    """Result of an audit. :func:`audit` returns it. It can be pickled.
+
+    As a table it has the findings of all parts of the question. ``part`` is the part, such as ``separation`` or
+    ``speed_m_s``, and ``finding`` is ``closest``, ``violation`` or ``undecided``. The other columns are those of
+    ``closest`` and ``violations``.
+    """
 
     _truth = "is_clear or raise_for_violation()"
     #: Verdict in words: ``PROVED CLEAR``, ``CLEAR if straight between samples``, ``VIOLATION``, ``UNDECIDED``, ...
@@ -125,11 +134,13 @@ class Audit(Judgement):
     def __init__(self) -> None:
         raise TypeError("an audit is the result of tautline.audit(...)")
 
-    def _restore(self, outcome: Outcome, repeat: Callable[..., Outcome]) -> Audit:
-        """Sets the attributes; ``repeat`` repeats the audit."""
+    def _restore(
+        self, outcome: Outcome, repeat: Callable[..., Outcome], tracks: Callable[[], Tracks | None] = lambda: None
+    ) -> Audit:
+        """Sets the attributes; ``repeat`` repeats the audit, and ``tracks`` returns the samples."""
         self.verdict, *found, self._assumed = outcome
         super().__init__(*found)
-        self._repeat = repeat
+        self._repeat, self._tracks = repeat, tracks
         return self
 
     @property
@@ -153,6 +164,21 @@ class Audit(Judgement):
         """Gaps, in which a vehicle is not seen."""
         return Rows(Gap, self["gaps"]["listed"], self.vehicles)
 
+    def _columns(self) -> dict[str, Column]:
+        listed = [
+            (answer["part"], finding, row)
+            for answer in self["answers"]
+            for finding, rows in (
+                ("closest", answer["closest"]),
+                ("violation", answer["violations"]["listed"]),
+                ("undecided", answer["undecided"]["listed"]),
+            )
+            for row in rows
+        ]
+        parts, findings = [part for part, _, _ in listed], [finding for _, finding, _ in listed]
+        rows = Rows(Finding, [row for _, _, row in listed], self.vehicles)
+        return {"part": (parts, str), "finding": (findings, str), **rows._columns()}
+
     def to_html(self, file: PathLike) -> None:
         """Writes a page with figures. Repeats the audit for them.
 
@@ -166,6 +192,15 @@ class Audit(Judgement):
             raise Error(changed)
         if self._repeat(page)[3] != self._json:
             raise Error(f"{changed}; {page} shows the changed recording")
+
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draws the separations of the closest pairs over time with their limits. Returns the figure.
+
+        Where lines between samples do not show the findings, such as for curves or scaled separations, it draws the
+        smallest separations as bars. It reads a recording again. ``ax`` are axes of matplotlib, which it imports.
+        """
+        figure: Figure = _display.import_plots().audit(self, self._tracks(), ax)
+        return figure
 
     def raise_for_violation(self, allow_undecided: bool = False) -> None:
         """Raises :class:`ViolationError` for a violation, and for an undecided audit unless ``allow_undecided`` is
@@ -233,7 +268,7 @@ class AuditArguments(AuditOptions, ReadOptions, total=False):
 
 
 def audit(
-    t: ArrayLike | PathLike | Sequence[PathLike],
+    t: ArrayLike | ArrowTable | PathLike | Sequence[PathLike],
     positions: ArrayLike | None = None,
     **options: Unpack[AuditArguments],
 ) -> Audit:
@@ -379,12 +414,14 @@ def audit_files(
         raise TypeError("positions: an array (T, N, 3) is needed beside the times, or a path in their place")
     if has_arrays:
         raise TypeError(NO_ARRAYS)
+    if not isinstance(t, (str, os.PathLike, list, tuple)):
+        raise TypeError(f"t: a path, a table, or times beside positions are needed, not {type(t).__name__}")
     files, options = single_recording(paths(t, "t"), read_as), read_options(**read_as)
 
     def repeat(html: str | None = None) -> Outcome:
         return with_files(files + more_files, lambda: _native.audit_files(question, command, files, options, html))
 
-    return Audit.__new__(Audit)._restore(repeat(), repeat)
+    return Audit.__new__(Audit)._restore(repeat(), repeat, lambda: recorded_tracks(files, options))
 
 
 def audit_frame(
@@ -400,9 +437,15 @@ def audit_frame(
     options, table = read_options(**read_as), ParquetFrame(frame)
 
     def repeat(html: str | None = None) -> Outcome:
-        return with_files(files, lambda: _native.audit_table(question, command, str(table.path), options, html))
+        path = str(table.path)
+        try:
+            return with_files(files, lambda: _native.audit_table(question, command, path, options, html))
+        except Error as error:
+            # The temporary file is no file of the caller.
+            error.args = (str(error).replace(path, "table"),)
+            raise
 
-    return Audit.__new__(Audit)._restore(repeat(), repeat)
+    return Audit.__new__(Audit)._restore(repeat(), repeat, lambda: recorded_tracks([str(table.path)], options))
 
 
 def audit_arrays(
@@ -422,7 +465,24 @@ def audit_arrays(
     def repeat(html: str | None = None) -> Outcome:
         return _native.audit_arrays(question, command, t, positions, velocities, vehicles, findings, html)
 
-    return Audit.__new__(Audit)._restore(repeat(), repeat)
+    def tracks() -> Tracks:
+        seen: NDArray[np.bool_] = np.all(np.isfinite(positions), axis=2)
+        return {name: (t[seen[:, k]], positions[seen[:, k], k]) for k, name in enumerate(vehicles)}
+
+    return Audit.__new__(Audit)._restore(repeat(), repeat, tracks)
+
+
+def recorded_tracks(files: list[str], options: _native.ReadOptions) -> Tracks | None:
+    """Returns the samples of a recording; None for curves, and where it cannot be read again."""
+    try:
+        columns = _native.read(files, options)
+    except Error:
+        return None
+    if len(columns.piece_vehicle):
+        return None
+    of_vehicle = [columns.vehicle == number for number in range(len(columns.vehicles))]
+    samples = [(columns.t[rows], columns.position[rows]) for rows in of_vehicle]
+    return dict(zip(columns.vehicles, samples, strict=True))
 
 
 def unpickle(*pickled: Any) -> Audit:

@@ -69,7 +69,7 @@ def planned(
         files = [file]
     if not isinstance(law, str):
         check_law(law)
-    plan = {
+    plan: dict[str, object] = {
         "spec": file,
         "text": text,
         "law": law,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 COLOURS = {"good": "#1a7f37", "bad": "#cf222e", "open": "#9a6700"}
 PATHS = ("#0969da", "#bf3989", "#1a7f37", "#9a6700", "#8250df", "#cf222e", "#1b7c83", "#57606a")
 WIDTH, HEIGHT, EDGE = 360, 240, 14
-#: Largest number of vehicles, and of points for each, that are drawn.
-MAX_VEHICLES, MAX_POINTS = 200, 200
+#: Largest numbers of vehicles, and of points of all vehicles, that are drawn: less than 20 kB.
+MAX_VEHICLES, MAX_POINTS = 70, 800
 
 
 def make_card(tone: str, verdict: str, rows: Iterable[tuple[str, str]], drawing: str = "") -> str:
@@ -29,7 +30,8 @@ def draw_paths(positions: NDArray[np.float64], label: str) -> str:
     """Draws the paths of positions (T, N, 3) from above, each with a colour and a dot at its end."""
     if positions.size == 0:
         return ""
-    plane = positions[:: max(1, len(positions) // MAX_POINTS), :MAX_VEHICLES, :2]
+    points = max(2, MAX_POINTS // min(positions.shape[1], MAX_VEHICLES))
+    plane = positions[:: -(-len(positions) // points), :MAX_VEHICLES, :2]
     plane = np.concatenate([plane, positions[-1:, :MAX_VEHICLES, :2]])
     low, high = np.nanmin(plane, axis=(0, 1)), np.nanmax(plane, axis=(0, 1))
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
@@ -44,11 +46,11 @@ def draw_paths(positions: NDArray[np.float64], label: str) -> str:
         seen = np.isfinite(x[:, vehicle]) & np.isfinite(y[:, vehicle])
         if not seen.any():
             continue
-        points = list(zip(x[seen, vehicle], y[seen, vehicle], strict=True))
-        line = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
+        path = list(zip(x[seen, vehicle], y[seen, vehicle], strict=True))
+        line = " ".join(f"{a:.1f},{b:.1f}" for a, b in path)
         colour = PATHS[vehicle % len(PATHS)]
-        parts.append(f"<polyline points='{line}' fill='none' stroke='{colour}' stroke-width='1'/>")
-        parts.append(f"<circle cx='{points[-1][0]:.1f}' cy='{points[-1][1]:.1f}' r='3' fill='{colour}'/>")
+        parts.append(f"<polyline points='{line}' fill='none' stroke='{colour}'/>")
+        parts.append(f"<circle cx='{path[-1][0]:.1f}' cy='{path[-1][1]:.1f}' r='3' fill='{colour}'/>")
     return make_svg("".join(parts), label)
 
 
@@ -72,6 +74,15 @@ def draw_bars(names: Sequence[str], values: Sequence[float], limits: Sequence[fl
             f"{html.escape(name[:18])}</text>"
         )
     return make_svg("".join(parts), label)
+
+
+def import_plots() -> Any:
+    """Imports the module of plots, and with it matplotlib."""
+    try:
+        from . import _plots
+    except ImportError:
+        raise ImportError("plots need matplotlib: pip install matplotlib") from None
+    return _plots
 
 
 def make_svg(inside: str, label: str) -> str:

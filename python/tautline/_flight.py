@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from ._scenario import Scenario, restore, to_scenario
 from ._tables import Column, Row, Rows, Table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from typing_extensions import Unpack
 
@@ -130,21 +131,12 @@ class Flight(Judgement, Table):
         """
         return perform(self.t, self.positions, options, self._audited)
 
-    def plot(self) -> Figure:
-        """Draws the paths from above, and the smallest separation over time with delta. Imports matplotlib."""
-        try:
-            from matplotlib.figure import Figure
-        except ImportError:
-            raise ImportError("plots need matplotlib: pip install matplotlib") from None
-        figure = Figure(figsize=(10, 4.5), layout="constrained")
-        above, beside = figure.subplots(1, 2)
-        above.plot(self.positions[:, :, 0], self.positions[:, :, 1], linewidth=1)
-        above.scatter(self.positions[-1:, :, 0], self.positions[-1:, :, 1], s=16, color="black", zorder=3)
-        above.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title=self.scenario.name)
-        beside.plot(self.t, self.separations_m, label="smallest separation")
-        beside.axhline(self.scenario.delta_m, color="tab:red", label="delta")
-        beside.set(xlabel="t [s]", ylabel="separation [m]", title=self.headline.partition(":")[0])
-        beside.legend()
+    def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+        """Draws the paths from above, and the smallest separation over time with delta. Returns the figure.
+
+        ``ax`` are axes of matplotlib for the paths, or two axes for both. Imports matplotlib.
+        """
+        figure: Figure = _display.import_plots().flight(self, ax)
         return figure
 
     def _repr_html_(self) -> str:

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "CampaignFolder",
     "Columns",
     "Error",
     "FlightData",
@@ -20,6 +21,7 @@ __all__ = [
     "audit_arrays",
     "audit_files",
     "audit_in_rust",
+    "audit_table",
     "campaign",
     "compare",
     "export",

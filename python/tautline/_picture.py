@@ -68,7 +68,7 @@ class Picture:
 
             self.figure = Figure(figsize=SIDES, dpi=DPI)
         self.is_shown = is_shown
-        self.axes = self.figure.add_axes((0.1, 0.08, 0.86, 0.84))
+        self.axes = self.figure.add_axes((0.12, 0.1, 0.84, 0.84))
         self.extent: NDArray[np.float64] | None = None
 
     def draw(self, worlds: Worlds, world: int) -> NDArray[np.uint8] | None:
@@ -109,7 +109,7 @@ class Picture:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         # A copy of a figure has no canvas of its own.
-        canvas = FigureCanvasAgg(self.figure)
+        canvas: Any = FigureCanvasAgg(self.figure)
         canvas.draw()
         return np.array(canvas.buffer_rgba())[..., :3].copy()
 

@@ -6,8 +6,8 @@ import html
 import inspect
 import types
 import typing
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping, Sequence, ValuesView
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from . import _native
 
@@ -29,8 +29,10 @@ Column = tuple[Any, Any]
 class Table:
     """A flat table: a row for each finding, instant or flight, and a column of plain values for each key.
 
-    Its columns and their types do not depend on the number of rows. Libraries of data frames read it without a copy
-    through Arrow, such as ``polars.DataFrame(table)``.
+    Its columns and their types do not depend on the number of rows. With pyarrow, other libraries read it through
+    Arrow: ``polars.DataFrame(answer)``, ``duckdb.sql("from answer")``, ``pyarrow.table(answer)``.
+
+    A table is no ``collections.abc.Mapping`` or ``Sequence``: polars would read it by its keys or items.
     """
 
     def _columns(self) -> dict[str, Column]:
@@ -54,9 +56,9 @@ class Table:
         return self.to_arrow().__arrow_c_stream__(requested_schema)
 
 
-class Row(Mapping[str, Any]):
-    """A row of a result: a mapping with the keys of its JSON, which are attributes as well. As attributes, objects are
-    rows and lists of objects are tables. Subclasses annotate their keys."""
+class Record:
+    """Values by key. Keys are attributes as well: as attributes, objects are rows and lists of objects are tables.
+    Subclasses annotate their keys."""
 
     _kinds: Mapping[str, Any] = {}
 
@@ -78,8 +80,29 @@ class Row(Mapping[str, Any]):
     def __len__(self) -> int:
         return len(self._values)
 
+    def __contains__(self, key: object) -> bool:
+        return key in self._values
+
+    def keys(self) -> KeysView[str]:
+        """Returns the keys."""
+        return self._values.keys()
+
+    def values(self) -> ValuesView[Any]:
+        """Returns the values."""
+        return self._values.values()
+
+    def items(self) -> ItemsView[str, Any]:
+        """Returns pairs of a key and its value."""
+        return self._values.items()
+
+    def get(self, key: str, /, default: Any = None) -> Any:
+        """Returns the value of a key, or the default."""
+        return self._values.get(key, default)
+
     def __eq__(self, other: object) -> bool:
-        return dict(self) == dict(other) if isinstance(other, Mapping) else NotImplemented
+        if isinstance(other, Record):
+            return self._values == other._values
+        return self._values == dict(other) if isinstance(other, Mapping) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -100,14 +123,19 @@ class Row(Mapping[str, Any]):
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self._kinds, *filter(str.isidentifier, self._values)})
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{key}={value!r}' for key, value in self._values.items())})"
+
+
+class Row(Record, Mapping[str, Any]):
+    """A row of a result: a mapping with the keys of its JSON, which are attributes as well. As attributes, objects are
+    rows and lists of objects are tables. Subclasses annotate their keys."""
+
     @property
     def indices(self) -> tuple[int | None, ...]:
         """Indices of the vehicles of the row, from 0; None for an obstacle. Empty where it names no vehicle."""
         names = self._values.get("subjects", [self._values["vehicle"]] if "vehicle" in self._values else [])
         return tuple(self._vehicles.index(name) if name in self._vehicles else None for name in names)
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{key}={value!r}' for key, value in self._values.items())})"
 
 
 class OpenRow(Row):
@@ -121,11 +149,11 @@ class OpenRow(Row):
 R = TypeVar("R", bound=Row, covariant=True)
 
 
-class Rows(Sequence[R], Table):
+class Rows(Table, Generic[R]):
     """A list of rows, and a table. In the table nested keys are joined by dots, and nested tables are left out.
     ``first`` and ``second`` are the subjects, ``first_index`` and ``second_index`` their indices from 0."""
 
-    def __init__(self, kind: type[R], rows: Sequence[Mapping[str, Any]], vehicles: Sequence[str] = ()) -> None:
+    def __init__(self, kind: type[R], rows: Iterable[Mapping[str, Any]], vehicles: Sequence[str] = ()) -> None:
         self._kind, self._rows = kind, [kind(row, vehicles) for row in rows]
 
     @overload
@@ -138,8 +166,25 @@ class Rows(Sequence[R], Table):
     def __len__(self) -> int:
         return len(self._rows)
 
+    def __iter__(self) -> Iterator[R]:
+        return iter(self._rows)
+
+    def __reversed__(self) -> Iterator[R]:
+        return reversed(self._rows)
+
+    def __contains__(self, row: object) -> bool:
+        return row in self._rows
+
+    def index(self, row: object) -> int:
+        """Returns the index of the first equal row. Raises ``ValueError`` if no row is equal."""
+        return self._rows.index(row)  # type: ignore[arg-type]
+
+    def count(self, row: object) -> int:
+        """Returns the number of equal rows."""
+        return self._rows.count(row)  # type: ignore[arg-type]
+
     def __eq__(self, other: object) -> bool:
-        return list(self) == list(other) if isinstance(other, Sequence) else NotImplemented
+        return self._rows == list(other) if isinstance(other, (Rows, Sequence)) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -235,11 +280,17 @@ def make_table(columns: Mapping[str, Column], count: int, max_rows: int = 10) ->
         return "<p>none</p>"
     head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
     body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(format_cell(cells[k], name))}</td>" for name, (cells, _) in columns.items())
+        "<tr>" + "".join(f"<td>{html.escape(shown_cell(cells[k], name))}</td>" for name, (cells, _) in columns.items())
         for k in range(min(count, max_rows))
     )
     more = f"<p>and {count - max_rows} more</p>" if count > max_rows else ""
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
+
+
+def shown_cell(value: object, key: str) -> str:
+    """Returns the value of a key as a text for a small table. Long lists are cut."""
+    text, most = format_cell(value, key), 200 if isinstance(value, str) else 40
+    return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
 #: Last words of keys with a separation or another distance that must not be shown larger than it is.

@@ -1,24 +1,27 @@
-"""Tests that the code of docs/python.md runs."""
+"""Tests that the code of the pages on Python runs."""
 
 import os
 import re
 
 from shared import ROOT, Case, passing
 
-PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+#: Pages, each with a number of blocks that it exceeds.
+PAGES = {"python": 8, "learning": 1}
 
 
 class Session(Case):
-    def test_every_block_of_python_on_the_page_runs(self) -> None:
-        blocks = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-        self.assertGreater(len(blocks), 8)
-        t, p = passing()
-        names = {"t": t, "p": p}
+    def test_every_block_of_python_on_the_pages_runs(self) -> None:
         self.addCleanup(os.chdir, os.getcwd())
         os.chdir(self.folder)
-        for number, block in enumerate(blocks, 1):
-            with self.subTest(block=number):
-                exec(compile(block, f"docs/python.md, block {number}", "exec"), names)
+        for page, many in PAGES.items():
+            text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+            blocks = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+            self.assertGreater(len(blocks), many)
+            t, p = passing()
+            names = {"t": t, "p": p}
+            for number, block in enumerate(blocks, 1):
+                with self.subTest(page=page, block=number):
+                    exec(compile(block, f"docs/{page}.md, block {number}", "exec"), names)
 
     def test_a_session_with_the_whole_interface(self) -> None:
         self.addCleanup(os.chdir, os.getcwd())

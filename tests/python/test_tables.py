@@ -4,8 +4,10 @@ import subprocess
 import sys
 import unittest
 
+import duckdb
 import numpy as np
 import pandas
+import polars
 import pyarrow
 import pyarrow.parquet
 import tautline as tl
@@ -124,6 +126,127 @@ class Tables(Case):
         )
         ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
         self.assertIn("ImportError: tables of Arrow need pyarrow: pip install pyarrow", ran.stderr)
+
+
+class Libraries(Case):
+    def answers(self) -> dict[str, tuple[tl.Table, int]]:
+        """Returns tables of all kinds, each with the number of its rows."""
+        t, p = passing()
+        p[20:40, 3] = np.nan
+        audit, file = tl.audit(t, p, delta=1.5, limit={"speed": 0.1}), self.folder / "run.mcap"
+        flight = tl.fly(short(), record=file)
+        compared = tl.compare(short(), ["laplacian", "edge-tension"], runs=2)
+        margin = tl.margin("pentagon", "time.duration_s", 2, 60, scan=2, halvings=1)
+        sweep = tl.sweep(short(), {"law.alpha": [0.5, 1.0], "law.delta_m": [1, 9]})
+        spec = {"scenario": "pentagon", "runs": 3, "set": {"time.duration_s": 2.0}}
+        spec["vary"] = {"start.jitter_m": {"uniform": [0.0, 0.1]}}
+        campaign = tl.campaign(spec, self.folder / "camp", worst=0)
+        attack, check = tl.attack(short(), start=0.2, flights=3), tl.check("pentagon-collinear")
+        found = {
+            "audit": (audit, 9),
+            "audit.closest": (audit.closest, 6),
+            "audit.violations": (audit.violations, 1),
+            "audit.undecided": (audit.undecided, 0),
+            "audit.gaps": (audit.gaps, 1),
+            "audit.facts": (audit.facts, 2),
+            "flight": (flight, 5 * len(flight.t)),
+            "flight.reasons": (flight.reasons, 1),
+            "recording": (tl.read(file), 5 * len(flight.t)),
+            "comparison": (compared, 2),
+            "comparison.laws": (compared.laws, 2),
+            "comparison.laws[0].flights": (compared.laws[0].flights, 2),
+            "margin": (margin, 3),
+            "margin.probes": (margin.probes, 3),
+            "sweep": (sweep, 4),
+            "sweep.points": (sweep.points, 4),
+            "campaign": (campaign, 3),
+            "campaign.laws": (campaign.laws, 1),
+            "attack.bounds": (attack.bounds, 10),
+            "attack.progress": (attack.progress, len(attack["progress"])),
+            "check.warnings": (check.warnings, len(check["warnings"])),
+            "check.margins": (check.margins, 2),
+        }
+        self.others = attack, check
+        return found
+
+    def test_polars_duckdb_pandas_and_pyarrow_read_the_same_cells(self) -> None:
+        for name, (answer, rows) in self.answers().items():
+            with self.subTest(table=name):
+                arrow = pyarrow.table(answer)
+                cells = arrow.to_pylist()
+                frame, relation = polars.DataFrame(answer), duckdb.sql("from answer")
+                self.assertEqual((len(cells), frame.height, len(answer.to_pandas())), (rows,) * 3)
+                for columns in (frame.columns, relation.columns, list(answer.to_pandas().columns)):
+                    self.assertEqual(columns, arrow.column_names)
+                self.assertEqual(repr(frame.to_dicts()), repr(cells))
+                # A relation reads the table again for each result.
+                for _ in range(2):
+                    self.assertEqual(repr(relation.fetchall()), repr([tuple(row.values()) for row in cells]))
+                self.assertEqual(duckdb.sql("select count(*) from answer a, answer b").fetchall(), [(rows**2,)])
+                self.assertEqual(duckdb.from_arrow(answer).shape, (rows, arrow.num_columns))
+                self.assertEqual(polars.LazyFrame(frame).collect().shape, (rows, arrow.num_columns))
+        for other in self.others:
+            self.assertNotIsInstance(other, tl.Table)
+            with self.assertRaises(TypeError):
+                polars.DataFrame(other)
+            with self.assertRaises(TypeError):
+                pyarrow.table(other)
+            with self.assertRaisesRegex(duckdb.InvalidInputException, "not suitable for replacement scans"):
+                duckdb.sql("from other")
+
+    def test_an_empty_table_has_the_columns_and_types_of_a_full_one(self) -> None:
+        t, p = passing()
+        full, clear = tl.audit(t, p, delta=1.5), tl.audit(t, p, delta=0.1)
+        of_law = tl.compare(short(), ["laplacian"], runs=2).laws[0]
+        for rows, none in (
+            (full.violations, clear.violations),
+            (full, tl.Rows(tl.Finding, [])),
+            (of_law.flights, tl.Rows(type(of_law.flights[0]), [])),
+            (tl.Rows(type(of_law), [of_law]), tl.Rows(type(of_law), [])),
+            (tl.check("pentagon-collinear").warnings, tl.check("pentagon").warnings),
+            (tl.check("pentagon").margins, tl.check("crazyflies").margins),
+        ):
+            with self.subTest(table=repr(rows)[:60]):
+                few, many = polars.DataFrame(none).schema, polars.DataFrame(rows).schema
+                self.assertEqual(list(few.items()), [item for item in many.items() if item[0] in few])
+                self.assertEqual(len(few), len(many) - 2 * (rows is full))
+                self.assertNotIn(polars.Null, many.values())
+                types = dict(zip(duckdb.sql("from rows").columns, duckdb.sql("from rows").types, strict=True))
+                empty = duckdb.sql("from none")
+                self.assertEqual({name: types[name] for name in empty.columns},
+                                 dict(zip(empty.columns, empty.types, strict=True)))  # fmt: skip
+                self.assertEqual(empty.fetchall(), [])
+
+    def test_an_audit_is_the_table_of_its_findings(self) -> None:
+        audit = tl.audit(*passing(), delta=1.5, limit={"speed": 0.1})
+        found = duckdb.sql("""select part, first, "second", lower from audit where finding = 'violation'""").fetchall()
+        self.assertEqual([row[:3] for row in found], [("separation", "1", "2"), ("speed_m_s", "1", None)])
+        self.assertEqual(found[0][3], audit.violations[0].lower)
+        closest = polars.DataFrame(audit).filter(part="separation", finding="closest")
+        self.assertEqual(closest["lower"].to_list(), [finding.lower for finding in audit.closest])
+
+    def test_a_sweep_has_a_column_for_each_key(self) -> None:
+        sweep = tl.sweep(short(), {"law.alpha": [0.5, 1.0], "law.delta_m": [1, 9]})
+        found = duckdb.sql('select "law.alpha", "law.delta_m", refused from sweep').fetchall()
+        self.assertEqual(found, [(0.5, 1.0, 0), (0.5, 9.0, 1), (1.0, 1.0, 0), (1.0, 9.0, 1)])
+
+    def test_answers_and_rows_work_like_dictionaries_and_lists(self) -> None:
+        answer = tl.compare(short(), ["laplacian", "edge-tension"], runs=1)
+        plain = answer.to_dict()
+        self.assertEqual((dict(answer), dict(answer.items()), {**answer}), (plain,) * 3)
+        self.assertEqual((list(answer), list(answer.keys()), list(answer.values())),
+                         (list(plain), list(plain), list(plain.values())))  # fmt: skip
+        self.assertTrue("runs" in answer and "nope" not in answer and len(answer) == len(plain))
+        self.assertEqual((answer.get("runs"), answer.get("nope"), answer.get("nope", 3)), (1, None, 3))
+        self.assertTrue(answer == plain and answer != {} and answer != 3)
+        laws = answer.laws
+        self.assertEqual([law.name for law in reversed(laws)], ["edge-tension", "laplacian"])
+        self.assertTrue(laws[0] in laws and 3 not in laws)
+        self.assertEqual((laws.index(laws[1]), laws.count(laws[1])), (1, 1))
+        self.assertRaises(ValueError, laws.index, 3)
+        self.assertEqual((laws[:1], laws[-1].name), ([laws[0]], "edge-tension"))
+        self.assertTrue(laws == list(laws) and laws == answer.laws and laws != list(laws)[:1])
+        self.assertEqual(polars.DataFrame(list(laws)).height, 2)
 
 
 class Attributes(Case):
