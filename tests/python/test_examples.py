@@ -15,6 +15,7 @@ sys.path.insert(0, str(RECIPES))
 
 import gym_pybullet_drones  # noqa: E402
 import pettingzoo_formation  # noqa: E402
+import train_ppo  # noqa: E402
 import trained_policy  # noqa: E402
 
 
@@ -47,6 +48,27 @@ class Recipes(unittest.TestCase):
         untrained, sets = trained_policy.damped_spring(), trained_policy.SETS
         self.assertEqual(trained_policy.fly(untrained, False, 6, sets)[0], 6)
         self.assertEqual(trained_policy.fly(untrained, True, 6, sets)[0], 0)
+
+    def test_the_reference_tasks_are_flown_without_and_with_the_shield(self) -> None:
+        for task, least in (("swap", 6), ("formation", 0), ("obstacles", 6)):
+            with self.subTest(task=task):
+                bare, shielded = (train_ppo.evaluate(task, train_ppo.spring, shield, 6) for shield in (False, True))
+                self.assertGreaterEqual(bare.violations, least)
+                self.assertLessEqual(bare.missed, bare.violations)
+                self.assertEqual((shielded.violations, bare.shielded, shielded.shielded > 0), (0, 0.0, True))
+                self.assertGreater(shielded.returned, bare.returned)
+                self.assertLess(shielded.error_m, 1.0)
+        self.assertEqual(train_ppo.evaluate("swap", train_ppo.spring, True, 6, 3).returned,
+                         train_ppo.evaluate("swap", train_ppo.spring, True, 6, 3).returned)  # fmt: skip
+        self.assertIn("0 violated", str(shielded))
+
+    def test_an_observation_has_the_nearest_vehicles_first(self) -> None:
+        env = train_ppo.environment("formation", 3, "NextStep")
+        observations, _ = env.reset(seed=1)
+        self.assertEqual(observations.shape, (3, 5, 2 * (2 + train_ppo.NEAREST)))
+        vectors = observations.reshape(3, 5, -1, 2)[:, :, 2:]
+        distances = np.linalg.norm(vectors, axis=-1)
+        self.assertTrue((np.diff(distances, axis=-1) >= 0).all() and (distances > 0).all() and (distances < 1).all())
 
     def test_the_cost_of_a_candidate_that_collides_is_high(self) -> None:
         sets = {**trained_policy.SETS, "time.duration_s": 8.0}
