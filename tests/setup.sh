@@ -51,14 +51,22 @@ if needed_by crates ignored film; then
         debian xvfb xdotool libx11-6 libx11-xcb1 libxcursor1 libxi6 libxrandr2 libxkbcommon-x11-0
 fi
 
-# Builds a program from source, unless target/FOLDER/bin has it: tool FOLDER PROGRAM [arguments of cargo install]
+# Builds a program from source into target/FOLDER/bin: tool FOLDER PROGRAM [options of cargo install] NAME@VERSION
+# All checkouts of a user share it.
 tool() {
     folder=target/$1
     program=$2
     shift 2
-    if ! "$folder/bin/$program" --version >/dev/null 2>&1; then
-        cargo install --quiet --locked --debug --root "$folder" --target-dir "$folder/build" "$@"
-        rm -rf "$folder/build"
+    for version; do :; done
+    kept=${XDG_CACHE_HOME:-$HOME/.cache}/tautline/$version
+    if ! "$kept/bin/$program" --version >/dev/null 2>&1; then
+        cargo install --quiet --locked --debug --root "$kept" --target-dir target/tool "$@"
+        rm -rf target/tool
+    fi
+    if [ "$(readlink "$folder")" != "$kept" ]; then
+        mkdir -p target
+        rm -rf "$folder"
+        ln -s "$kept" "$folder"
     fi
 }
 

@@ -12,7 +12,7 @@ fly() { target/release/tautline run swap "$@" --quiet --no-figures --no-snapshot
 fly --set law.kind=laplacian --set name=no-avoidance --out "$out/without" || [ $? = 1 ]
 fly --set name=certified-law --out "$out/with"
 target/release/tautline render "$out/without/run.mcap" --beside "$out/with/run.mcap" --film docs/gallery/first.gif \
-    --size 720x360 --film-fps 9 --until 26 --speed 4 --trail 2 --adapter none --quiet
+    --size 560x280 --film-fps 8 --until 24 --speed 8 --trail 1.5 --adapter none --quiet
 
 target/release/tautline compare swap --laws laplacian,orca,cbf-qp,displacement --shield --runs 20 \
     --set actuation.max_accel_m_s2=5 --html "$out/compare.html" --quiet
