@@ -32,7 +32,7 @@ HZ, ACCEL_M_S2 = 20.0, 2.0
 #: Number of nearest vehicles and obstacles that a vehicle observes.
 NEAREST = 4
 #: Vehicles of the training in all worlds, steps of single vehicles, and episodes of an evaluation.
-VEHICLES, STEPS, EPISODES = 192, 3_000_000, 200
+VEHICLES, STEPS, EPISODES = 192, 6_000_000, 200
 #: Seed of the evaluation.
 UNSEEN = 10**9
 
@@ -202,6 +202,11 @@ def spring(observations: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.clip(observations[..., axes : 2 * axes] - 0.6 * observations[..., :axes], -1, 1)
 
 
+def added(observations: NDArray[np.float32], learned: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Returns the action of the spring plus what a network has learned, which may turn it round."""
+    return np.clip(spring(observations) + 2.0 * learned, -1, 1)
+
+
 def train(task: str, steps: int = STEPS, seed: int = 0) -> Policy:
     """Trains a policy for a number of steps of single vehicles."""
     import gymnasium
@@ -221,14 +226,14 @@ def train(task: str, steps: int = STEPS, seed: int = 0) -> Policy:
             super().__init__(worlds * self.vehicles, space, gymnasium.spaces.Box(-1.0, 1.0, (axes,), np.float32))
 
         def reset(self) -> Any:
-            observations, _ = self.env.reset(seed=seed)
-            return observations.reshape(self.num_envs, -1)
+            self.seen, _ = self.env.reset(seed=seed)
+            return self.seen.reshape(self.num_envs, -1)
 
         def step_async(self, actions: Any) -> None:
-            self.actions = actions.reshape(self.env.action_space.shape)
+            self.actions = added(self.seen, actions.reshape(self.env.action_space.shape))
 
         def step_wait(self) -> Any:
-            observations, _, terminated, truncated, info = self.env.step(self.actions)
+            self.seen, _, terminated, truncated, info = self.env.step(self.actions)
             infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
             done = terminated | truncated
             for world in np.flatnonzero(done):
@@ -238,7 +243,7 @@ def train(task: str, steps: int = STEPS, seed: int = 0) -> Policy:
                         "TimeLimit.truncated": bool(truncated[world]),
                     }
             rewards = self.env.reward.of_vehicles.reshape(-1)
-            return observations.reshape(self.num_envs, -1), rewards, np.repeat(done, self.vehicles), infos
+            return self.seen.reshape(self.num_envs, -1), rewards, np.repeat(done, self.vehicles), infos
 
         def close(self) -> None:
             self.env.close()
@@ -266,7 +271,8 @@ def train(task: str, steps: int = STEPS, seed: int = 0) -> Policy:
 
     def policy(observations: NDArray[np.float32]) -> NDArray[np.float32]:
         flat = observations.reshape(-1, observations.shape[-1])
-        return np.asarray(model.predict(flat, deterministic=True)[0]).reshape(*observations.shape[:2], -1)
+        learned = np.asarray(model.predict(flat, deterministic=True)[0]).reshape(*observations.shape[:2], -1)
+        return added(observations, learned)
 
     return policy
 
