@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 import tautline as tl
+from tautline.learning import Worlds
 
 ROUNDS = 5
 WORLDS = 1000
@@ -60,6 +61,22 @@ def near(scenario: tl.Scenario, calls: int, steps: int) -> tuple[Callable[[], ob
             sim.step(u, steps=steps)
 
     return work, calls * steps * WORLDS * len(scenario)
+
+
+def filtered(name: str, shield: bool, worlds: int = 200, periods: int = 20) -> tuple[Callable[[], object], int]:
+    """Returns work in worlds of a learning environment under random actions, 20 a second, and its number of commands of
+    single vehicles. A shield filters each of them."""
+    sim = Worlds(name, worlds, threads=1, shield=shield, set={"time.duration_s": 1000.0})
+    sim.begin(np.ones(worlds, dtype=np.bool_), None, 0)
+    steps = round(0.05 / sim.scenario.dt_s)
+    # Actions turn round and round, so that the vehicles stay near each other.
+    u = np.random.default_rng(0).uniform(-2.0, 2.0, (worlds, len(sim.scenario), 3))
+
+    def work() -> None:
+        for k in range(periods):
+            sim.step(u if k % 2 else -u, steps=steps)
+
+    return work, periods * worlds * len(sim.scenario)
 
 
 def starts(scenario: tl.Scenario, kept: list[tl.VectorSimulation]) -> str:
@@ -128,13 +145,19 @@ def main() -> None:
             ratio = found[f"2 threads, {steps} a call"][1] / found[f"1 thread, {steps} a call"][1]
             print(f"  two threads, {steps} a call: {ratio:.2f} times as fast as one")
 
-
     still = tl.Scenario("pentagon", set={**SETS, "swarm.a22_per_s": 0.0})
     found = rates({"far apart": vector(still, 1, 10, 10), "near": near(still, 10, 10)})
     print("points at 240 Hz, 1 thread, 10 steps a call")
     print(f"  all pairs far apart                   {found['far apart'][0]:6.2f} a second of processor time")
     print(f"  half of the worlds with a violation   {found['near'][0]:6.2f} a second of processor time")
     print(f"  ratio                                 {found['near'][0] / found['far apart'][0]:6.2f}")
+    for name in ("pentagon", "swap"):
+        found = rates({"bare": filtered(name, False), "shield": filtered(name, True)})
+        bare, shielded = (1e6 * found[kind][0] for kind in ("bare", "shield"))
+        print(f"{name} with 20 random actions a second, 1 thread")
+        print(f"  actions of single vehicles without shield   {bare:9.0f} a second of processor time")
+        print(f"  filtered by the shield                      {shielded:9.0f} a second of processor time")
+        print(f"  filter alone                                {1 / (1 / shielded - 1 / bare):9.0f} a second")
 
 
 if __name__ == "__main__":
