@@ -348,6 +348,17 @@ def perform(
     findings: _native.FlightFindings | None = None,
 ) -> Audit:
     """Audits with the arguments of :func:`audit`, those of a flight with the findings of its run."""
+    found = performed(t, positions, arguments, findings)
+    if arguments.get("offset"):
+        # The samples have other times than the findings.
+        found._tracks = lambda: None
+    return found
+
+
+def performed(
+    t: object, positions: object, arguments: Mapping[str, Any], findings: _native.FlightFindings | None
+) -> Audit:
+    """Audits with the arguments of :func:`perform`."""
     options = {name: check(arguments[name], name) for name, check in CHECKS.items() if name in arguments}
     names, velocities = arguments.get("names"), arguments.get("velocities")
     read_as = {name: arguments[name] for name in arguments if name not in AuditOptions.__annotations__}
@@ -434,6 +445,8 @@ def audit_frame(
 ) -> Audit:
     if has_arrays:
         raise TypeError(NO_ARRAYS)
+    if boolean(read_as.get("join", False), "join"):
+        raise TypeError("join: only for files, but a table is given")
     options, table = read_options(**read_as), ParquetFrame(frame)
 
     def repeat(html: str | None = None) -> Outcome:
@@ -490,6 +503,6 @@ def unpickle(*pickled: Any) -> Audit:
     outcome = unsealed("Audit", *pickled)
 
     def repeat(html: str | None = None) -> Outcome:
-        raise Error("to_html: the recording is not at hand here; write the page in the process of the audit")
+        raise Error("to_html: a pickled or copied audit has no recording; write the page with the audit itself")
 
     return Audit.__new__(Audit)._restore((*outcome,), repeat)

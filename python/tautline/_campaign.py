@@ -59,9 +59,11 @@ def planned(
 ) -> tuple[dict[str, object], list[str]]:
     """Returns the plan of a campaign for the native module, and the files that it reads."""
     folder, text, files = optional_path(out, "out"), None, []
+    if folder == "":
+        raise Error("out: the path of the folder is empty")
     if isinstance(spec, Mapping):
         if folder is None:
-            raise Error("out: a folder is needed beside a specification that is no file")
+            raise Error("out: missing beside a dictionary; give a folder")
         file = f"{Path(folder).name}.toml"
         text = "".join(f"{json.dumps(str(key))} = {to_toml_value(value)}\n" for key, value in spec.items())
     else:
@@ -85,7 +87,7 @@ class CampaignFolder:
     """A planned campaign in a folder. Any process that sees the folder can fly any of its shards (docs/clusters.md).
 
     ``CampaignFolder(folder)`` opens a campaign, also one of the command line; :meth:`plan` makes one. Raises
-    :class:`Error` where the folder holds no campaign, or one that this program, or this file of its law, did not plan.
+    :class:`Error` where the folder holds no campaign, or if another program, or another file of the law, planned it.
     """
 
     def __init__(self, folder: PathLike) -> None:
@@ -142,7 +144,7 @@ class CampaignFolder:
     def fly(self, shards: int | Iterable[int], *, threads: int = 1, progress: Progress = None) -> None:
         """Flies shards in this process. Finished flights are kept, also after an exception.
 
-        A law in Python flies on the calling thread alone.
+        A law in Python flies on the calling thread alone, whatever the number of threads.
         """
         chosen = [count(shard, "shards") for shard in (shards if isinstance(shards, Iterable) else [shards])]
         if wrong := [shard for shard in chosen if shard >= self.shards]:
@@ -151,15 +153,20 @@ class CampaignFolder:
 
     def fly_in_processes(self, processes: int | None = None, *, progress: Progress = None) -> None:
         """Flies the missing shards in processes of their own, by default one for each core. Begins no further shard
-        once the rule ``until_width`` or ``until_decided`` is met. Raises what a process printed where it failed."""
-        many = optional_count(processes, "processes") or os.cpu_count() or 1
+        once the rule ``until_width`` or ``until_decided`` is met. Raises :class:`Error` with the output of a failed
+        process."""
+        many = optional_count(processes, "processes")
+        if many == 0:
+            raise Error("processes: must be at least 1, got 0")
         report, missing, runs = to_report(progress), self.missing(), self.runs / self.shards
 
         def ended(flown: int) -> None:
             if report is not None:
                 report(round(flown * runs), round(len(missing) * runs))
 
-        fly_shards(self.path, missing, many, ended, self._native.has_answer)
+        fly_shards(self.path, missing, many or os.cpu_count() or 1, ended, self._native.has_answer)
+        if not self._native.has_answer() and (left := self.missing()):
+            raise Error(f"shards {left}: their processes ended without a result; the law must not end its process")
 
     def merge(self, *, worst: int = 10, progress: Progress = None) -> Campaign:
         """Merges all shards and writes the answer, its table and its page, as :func:`campaign` does. Raises
@@ -202,12 +209,14 @@ def campaign(
     Raises ``FileNotFoundError`` for a missing specification and :class:`Error` for a wrong one.
     """
     plan, files = planned(spec, out, law, shards, until_width, until_decided)
-    many = optional_count(threads, "threads")
+    many, report = optional_count(threads, "threads"), to_report(progress)
     if isinstance(law, str):
+        if many == 0:
+            raise Error("threads: must be at least 1, got 0")
         folder = CampaignFolder._of(with_files(files, lambda: _native.CampaignFolder.plan(plan)))
-        folder.fly_in_processes(many, progress=progress)
+        folder.fly_in_processes(many, progress=report)
         return folder.merge(worst=worst)
-    more = count(worst, "worst"), to_report(progress)
+    more = count(worst, "worst"), report
     answer, found = with_files(files, lambda: _native.campaign(plan, many, *more))
     return Campaign(*answer, Path(found).absolute())
 

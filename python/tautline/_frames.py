@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 import weakref
 from pathlib import Path
@@ -48,22 +49,20 @@ class ParquetFrame:
         if name in ("Series", "ChunkedArray"):
             raise TypeError(f"t: a {name} has a single column; give a table, or positions beside the times")
         table = to_table(pyarrow, frame)
-        with tempfile.NamedTemporaryFile(suffix=".parquet", prefix="tautline-", delete=False) as file:
-            self.path = Path(file.name)
-            weakref.finalize(self, remove, file.name, os.getpid())
-            try:
-                parquet.write_table(table, file, compression="none")
-            except pyarrow.ArrowException as problem:
-                raise Error(f"t: the table cannot be stored: {problem}; {REMEDY}") from None
+        folder = tempfile.mkdtemp(prefix="tautline-")
+        weakref.finalize(self, remove, folder, os.getpid())
+        # The reader names the only vehicle of a table without names after its file.
+        self.path = Path(folder) / "table.parquet"
+        try:
+            parquet.write_table(table, self.path, compression="none")
+        except pyarrow.ArrowException as problem:
+            raise Error(f"t: the table cannot be stored: {problem}; {REMEDY}") from None
 
 
-def remove(file: str, process: int) -> None:
-    """Removes the file of a process, unless this is a copy of the process or the file is missing."""
-    try:
-        if os.getpid() == process:
-            os.remove(file)
-    except OSError:
-        pass
+def remove(folder: str, process: int) -> None:
+    """Removes the folder of a process, unless this is a copy of the process."""
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def to_table(pyarrow: Any, frame: object) -> Any:
@@ -137,7 +136,7 @@ def of_pandas(pyarrow: Any, frame: Any) -> Any:
     An index that has a name or times becomes a column, another index is left out. Columns of several levels get one
     name, such as ``cf1.x``.
     """
-    frame = frame.set_axis([column_name(name) for name in frame.columns], axis=1)
+    frame = frame.set_axis(column_names(list(frame.columns)), axis=1)
     check_names(list(frame.columns))
     levels = {}
     for level, name in enumerate(frame.index.names):
@@ -159,10 +158,18 @@ def of_pandas(pyarrow: Any, frame: Any) -> Any:
         raise
 
 
-def column_name(name: object) -> str:
-    """Returns the name of a column: of several levels ``vehicle.axis``, in either order."""
-    levels = [str(level) for level in name if level != ""] if isinstance(name, tuple) else [str(name)]
-    return ".".join(sorted(levels, key=lambda level: level.lower() in AXES))
+def column_names(names: list[object]) -> list[str]:
+    """Returns the names of columns: of two levels ``vehicle.axis``, in either order.
+
+    Raises :class:`Error` where the words of both levels are axes.
+    """
+    tuples = [name if isinstance(name, tuple) else (name,) for name in names]
+    parts = [[str(level) for level in levels if level != ""] for levels in tuples]
+    pairs = [levels for levels in parts if len(levels) == 2]
+    are_axes = [bool(pairs) and all(levels[k].lower() in AXES for levels in pairs) for k in (0, 1)]
+    if all(are_axes):
+        raise Error("t: both levels of the columns are axes, such as x; rename the vehicles")
+    return [".".join(levels[::-1] if are_axes[0] and len(levels) == 2 else levels) for levels in parts]
 
 
 def to_seconds(value: object) -> NDArray[np.float64] | None:
@@ -185,9 +192,11 @@ def to_seconds(value: object) -> NDArray[np.float64] | None:
     unit, _ = np.datetime_data(array.dtype)
     if unit in ("generic", "Y", "M"):
         raise Error(f"t: the unit of {array.dtype} has no fixed length; give seconds or a finer unit")
+    counts = array.astype(np.int64)
+    first = int(counts.flat[0]) if array.dtype.kind == "M" and array.size else 0
+    if array.size and max(int(counts.max()) - first, first - int(counts.min())) > EXACT_INTEGER:
+        raise Error(f"t: {array.dtype} counts beyond 2^53, where float64 rounds; give a coarser unit")
     if array.dtype.kind == "M" and array.size:
         array = array - array.flat[0]
-    if array.size and int(np.abs(array.astype(np.int64)).max()) > EXACT_INTEGER:
-        raise Error(f"t: {array.dtype} counts beyond 2^53, where float64 rounds; give a coarser unit")
     seconds: NDArray[np.float64] = array / np.timedelta64(1, "s")
     return seconds

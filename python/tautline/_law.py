@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
+import importlib.machinery
+import importlib.util
 import os
 import sys
+import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
@@ -74,28 +76,53 @@ def check_law(law: object) -> None:
 def import_law(name: str) -> tuple[Callable[[], ControlLaw], str]:
     """Returns a function that makes the law ``MODULE:CLASS``, and the SHA-256 of the file of the module.
 
-    The class, or function, is called without arguments. The module is searched in the working folder as well.
+    The class, or function, is called without arguments. The module is searched in the working folder as well. Its code
+    is that of the bytes with this SHA-256, also where the module was imported before and has changed since.
     """
     module_name, _, path = name.partition(":")
     if not module_name or not path:
         raise Error(f"law: MODULE:CLASS is needed, such as my_laws:Springs, got {name!r}")
+    if module_name == "__main__":
+        raise Error("law: other processes cannot import a script; move the class into a module")
     if os.getcwd() not in sys.path and "" not in sys.path:
         sys.path.insert(0, os.getcwd())
-    module = importlib.import_module(module_name)
-    found: Any = module
+    importlib.invalidate_caches()
+    spec = importlib.util.find_spec(module_name)
+    if spec is None:
+        raise ModuleNotFoundError(f"No module named {module_name!r}", name=module_name)
+    if spec.origin is None or not isinstance(spec.loader, importlib.machinery.SourceFileLoader):
+        raise Error(f"law: {module_name} has no file of Python that other processes can import")
+    source = Path(spec.origin).read_bytes()
+    sha256 = hashlib.sha256(source).hexdigest()
+    found: Any = module_of(spec, spec.loader, source, sha256)
     for part in path.split("."):
         if not hasattr(found, part):
             raise Error(f"law: {module_name} has no {path}")
         found = getattr(found, part)
     if not callable(found):
         raise Error(f"law: {name} must be a class, or a function that returns a law")
-    file = getattr(module, "__file__", None)
-    if file is None:
-        raise Error(f"law: {module_name} has no file that other processes can import")
 
     def make() -> ControlLaw:
         law: ControlLaw = found()
         check_law(law)
         return law
 
-    return make, hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    return make, sha256
+
+
+def module_of(
+    spec: importlib.machinery.ModuleSpec, loader: importlib.machinery.SourceFileLoader, source: bytes, sha256: str
+) -> types.ModuleType:
+    """Returns the module of exactly this source, under a name of its own."""
+    name = f"{spec.name}.{sha256}"
+    if name not in sys.modules:
+        module = types.ModuleType(name)
+        module.__dict__.update(__file__=spec.origin, __package__=spec.parent)
+        code = loader.source_to_code(source, spec.origin or name)
+        sys.modules[name] = module
+        try:
+            exec(code, module.__dict__)
+        except BaseException:
+            del sys.modules[name]
+            raise
+    return sys.modules[name]

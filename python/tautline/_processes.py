@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -26,22 +25,22 @@ class ShardProcess:
     def __init__(self, folder: Path, shard: int) -> None:
         self.shard = shard
         self._words: IO[bytes] = tempfile.TemporaryFile()
-        program = [sys.executable, "-m", "tautline", "campaign", "shard", str(folder), "--shard", str(shard), "--quiet"]
+        program = [sys.executable, "-m", "tautline._shard_process", str(folder.absolute()), str(shard)]
         # The process imports the modules that this one can import.
-        modules = os.pathsep.join(place or os.getcwd() for place in sys.path)
+        modules = os.pathsep.join(str(place) or os.getcwd() for place in sys.path)
         self._process = subprocess.Popen(
             program,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=self._words,
             env={**os.environ, "PYTHONPATH": modules},
-            # Ctrl-C is passed on by `stop` alone: a second signal would end the flight in progress.
+            # Ctrl-C is passed on by `ask_to_stop` alone: a second signal would end the flight in progress.
             start_new_session=True,
         )
 
     def has_ended(self) -> bool:
-        """Whether the shard is flown. Raises what the process printed where it failed: :class:`Error`, or ``OSError``
-        for a failure of the machine."""
+        """Whether the process has ended. Raises what it printed where it failed: :class:`Error`, or ``OSError`` for a
+        failure of the machine."""
         code = self._process.poll()
         if code is None or code == 0:
             return code == 0
@@ -52,20 +51,27 @@ class ShardProcess:
 
     def ask_to_stop(self) -> None:
         """Asks the process to end after its flight in progress, which is kept."""
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT if os.name == "posix" else signal.SIGTERM)
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+
+    def kill(self) -> None:
+        """Ends the process at once."""
+        self._process.kill()
 
     def wait(self) -> None:
         """Waits for the end of the process."""
         self._process.wait()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
         self._words.close()
 
 
 def fly_shards(
     folder: Path, shards: Iterable[int], processes: int, ended: Callable[[int], None], is_enough: Callable[[], bool]
 ) -> None:
-    """Flies shards, and calls ``ended`` with the number of those that are flown. Begins no further shard once
-    ``is_enough``. After an exception all processes end, and finished flights are kept."""
+    """Flies shards, and calls ``ended`` with the number of those that have ended. Begins no further shard once
+    ``is_enough``. After an exception all processes end, and finished flights are kept. A second Ctrl-C ends them at
+    once."""
     waiting, running, flown = list(shards)[::-1], list[ShardProcess](), 0
     try:
         while waiting or running:
@@ -80,7 +86,17 @@ def fly_shards(
                 if waiting and is_enough():
                     waiting.clear()
     finally:
-        for process in running:
-            process.ask_to_stop()
+        stop(running)
+
+
+def stop(running: Iterable[ShardProcess]) -> None:
+    """Ends processes after their flights in progress."""
+    for process in running:
+        process.ask_to_stop()
+    try:
         for process in running:
             process.wait()
+    except BaseException:
+        for process in running:
+            process.kill()
+        raise

@@ -54,12 +54,11 @@ class Scenario:
         self.files: tuple[str, ...] = tuple(files)
 
     def _check_unchanged(self) -> None:
-        """Raises where the file has changed or is missing: a flight would not be that of the file."""
-        if not self.files:
-            return
+        """Raises where a file of the scenario has changed or is missing: a flight would not be that of the file."""
         now = with_files(self.files, lambda: _native.Scenario(self._source, self._is_text, self._sets))
         if now.sha256 != self.sha256:
-            raise Error(f"{self._source}: has changed since it was read; create a new Scenario")
+            name = "the scenario" if self._is_text else self._source
+            raise Error(f"{name}: a file has changed since it was read; create a new Scenario")
 
     def _source_state(self) -> tuple[Any, ...]:
         """Returns the arguments of `restore` for this scenario."""
@@ -155,7 +154,7 @@ class Scenario:
 
 def to_scenario(given: Scenario | PathLike, set: Mapping[str, Any] | None = None) -> Scenario:
     """Returns a scenario, or reads it by its name or path, with overrides. Every call that flies or checks a scenario
-    gets it here: one whose file has changed since is refused."""
+    calls this function, which refuses a scenario with a changed file."""
     if not isinstance(given, Scenario):
         return Scenario(given, set=set)
     given._check_unchanged()
@@ -171,7 +170,7 @@ def restore(source: str, is_text: bool, sets: list[str], files: tuple[str, ...],
     scenario._source, scenario._is_text, scenario._sets, scenario.files = source, is_text, sets, files
     scenario._native = with_files(files, lambda: _native.Scenario(source, is_text, sets))
     if sha256 not in (None, scenario.sha256):
-        raise Error(f"{source}: has changed since the Scenario was created")
+        raise Error(f"{'the scenario' if is_text else source}: a file has changed since the Scenario was created")
     return scenario
 
 

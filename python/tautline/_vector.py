@@ -71,9 +71,8 @@ class VectorSimulation:
         self._native = _native.VectorSimulation(
             self.scenario._native, numbered, workers, boolean(autoreset, "autoreset"), self._is_environment
         )
-        #: Whether a step resets the worlds that have ended.
-        self.autoreset = bool(autoreset)
-        self._threads = threads
+        self._autoreset = bool(autoreset)
+        self._threads = None if threads is None else workers
         self._history = History(boolean(keep_history, "keep_history"), self.seeds.tolist())
 
     def step(
@@ -104,6 +103,9 @@ class VectorSimulation:
             commands = u
         elif u is not None:
             commands = exact_array(u, "u")
+        if commands is not None and self._history.keeps_steps:
+            # The accelerations may be an array of this simulation, which the step changes.
+            commands = commands.copy()
         try:
             self._native.step(commands, min(int(steps), 2**63))
         except BaseException as problem:
@@ -152,6 +154,11 @@ class VectorSimulation:
             raise Error(f"{name}: an array of shape {wanted} is needed, not of shape {rows.shape}")
         rows = np.concatenate([rows, np.zeros((*rows.shape[:-1], 3 - rows.shape[-1]))], axis=-1)
         return np.ascontiguousarray(np.broadcast_to(rows, (self.num_envs, vehicles, 3)))
+
+    @property
+    def autoreset(self) -> bool:
+        """Whether a step resets the worlds that have ended."""
+        return self._autoreset
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -239,7 +246,8 @@ class VectorSimulation:
             raise TypeError(f"mask: an array of bool is needed, not of {chosen.dtype}")
         if chosen.shape != (self.num_envs,):
             raise Error(f"mask: an array of shape ({self.num_envs},) is needed, not of shape {chosen.shape}")
-        return np.ascontiguousarray(chosen)
+        # The mask may be an array of this simulation, which a reset changes.
+        return np.array(chosen)
 
     def _seeds(self, seeds: Sequence[int] | NDArray[np.integer[Any]]) -> list[int]:
         """Returns a seed for each world."""
@@ -299,7 +307,7 @@ class VectorSimulation:
 
     def _more(self) -> dict[str, Any]:
         """Returns the attributes of a subclass and of its users."""
-        own = ("_native", "_history", "_threads", "scenario", "num_envs", "autoreset")
+        own = ("_native", "_history", "_threads", "_autoreset", "scenario", "num_envs")
         return {name: value for name, value in self.__dict__.items() if name not in own}
 
     def save(self) -> bytes:
@@ -324,6 +332,8 @@ class VectorSimulation:
 
         Raises :class:`Error` for damaged bytes, and for those of another program whose flight differs.
         """
+        if cls._is_environment:
+            raise TypeError(f"{cls.__name__}: the worlds of an environment are loaded with it; pickle the environment")
         return VectorSimulation._loaded(cls, data, {})
 
     @staticmethod
@@ -335,15 +345,16 @@ class VectorSimulation:
         loaded = object.__new__(kind)
         loaded.__dict__.update(more)
         loaded.scenario, loaded.num_envs = restore(*about["scenario"]), about["num_envs"]
-        loaded._threads, loaded.autoreset = about["threads"], about["autoreset"]
+        loaded._threads, loaded._autoreset = about["threads"], about["autoreset"]
         everyone = np.ones(loaded.num_envs, dtype=np.bool_)
         for call, arrays in saved.calls():
             if "steps" in call:
                 loaded.step(arrays[0] if arrays else None, steps=call["steps"])
                 continue
             if not hasattr(loaded, "_native"):
+                workers = loaded._threads or 0
                 loaded._native = _native.VectorSimulation(
-                    loaded.scenario._native, call["seeds"], loaded._threads or 0, loaded.autoreset, kind._is_environment
+                    loaded.scenario._native, call["seeds"], workers, loaded._autoreset, kind._is_environment
                 )
                 loaded._history = History(about["keeps_steps"], call["seeds"])
                 mask, starts = everyone, tuple(arrays)
@@ -357,7 +368,10 @@ class VectorSimulation:
 
     def _state(self) -> NDArray[np.float64]:
         """Returns the state that a loaded copy must have."""
-        return np.concatenate([self.positions.ravel(), self.velocities.ravel(), self.least_clearance_m])
+        # A seed of 63 bits is no float64, its halves are.
+        halves = self.seeds.view(np.uint32)
+        floats = self.positions.ravel(), self.velocities.ravel(), self.least_clearance_m
+        return np.concatenate([*floats, self.is_over, self.steps, halves], dtype=np.float64)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return VectorSimulation._loaded, (type(self), self.save(), self._more())

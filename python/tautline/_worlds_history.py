@@ -26,7 +26,7 @@ Starts = tuple[NDArray[np.float64], NDArray[np.float64]] | None
 
 
 class History:
-    """Calls since the last reset of all worlds. Steps are kept only where that is asked for."""
+    """Calls since the last reset of all worlds. Steps are kept only with ``keep_history=True``."""
 
     def __init__(self, keeps_steps: bool, seeds: list[int]) -> None:
         self.keeps_steps = keeps_steps
@@ -51,18 +51,18 @@ class History:
         self._calls, self._arrays, self._lost = [], [], self._lost or reason
 
     def add_step(self, u: NDArray[np.floating[Any]] | None, steps: int) -> None:
-        """Adds steps under the law, or with accelerations (E, N, 3) or (E, N, 2)."""
+        """Adds steps under the law, or with accelerations (E, N, 3) or (E, N, 2), which must not change later."""
         if not self.keeps_steps:
             self.lose(NOT_KEPT)
         elif self._lost is None:
-            self._add({"steps": steps}, *(() if u is None else (u.copy(),)))
+            self._add({"steps": steps}, *(() if u is None else (u,)))
 
     def add_reset(self, mask: NDArray[np.bool_], seeds: list[int], starts: Starts) -> None:
         """Adds a reset of the worlds with ``mask`` to these seeds of all worlds. A reset of all begins anew."""
         if mask.all():
             self._begin(seeds, starts)
         elif self._lost is None:
-            self._add({"seeds": seeds}, mask.copy(), *(starts or ()))
+            self._add({"seeds": seeds}, mask, *(starts or ()))
 
     def copy(self) -> History:
         """Returns an independent copy."""
@@ -90,8 +90,7 @@ class Saved:
         found = bytes(data)
         rest = found[len(MAGIC) + HASH :]
         if not found.startswith(MAGIC) or found[len(MAGIC) :][:HASH] != hashlib.sha256(rest).digest():
-            wrong = f"these are no saved worlds, or damaged ones ({len(found)} bytes)"
-            raise Error(f"data: {wrong}; give what save() returned")
+            raise Error(f"data: not the bytes of save(), or damaged ({len(found)} bytes)")
         with np.load(io.BytesIO(rest), allow_pickle=False) as arrays:
             self.about: dict[str, Any] = json.loads(str(arrays["header"]))
             self.state: NDArray[np.float64] = arrays["state"]

@@ -103,7 +103,8 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         """
         mask = np.ones(self.num_envs, dtype=np.bool_)
         if options is not None and options.get("reset_mask") is not None:
-            mask = options["reset_mask"]
+            # The mask may be an array of the worlds, which the reset changes.
+            mask = np.array(options["reset_mask"])
         self.sim.begin(mask, options, seed)
         if isinstance(seed, (int, np.integer)):
             super().reset(seed=int(seed))

@@ -1,11 +1,14 @@
 """Campaigns from Python: laws that processes import, folders with shards, dictionaries, and progress."""
 
+import concurrent.futures
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import time
 import unittest
+from collections.abc import Callable
 
 from shared import ROOT, Case, Springs
 
@@ -96,6 +99,29 @@ class Processes(Case):
         self.refuses(tl.Error, changed, lambda: tl.CampaignFolder("camp"))
         self.assertEqual(self.run_program("campaign", "merge", "camp").returncode, 2)
 
+    def test_a_module_that_changes_in_a_session_flies_as_it_is_in_its_file(self) -> None:
+        sys.path.insert(0, str(self.folder))
+        import processes_laws
+
+        self.assertEqual(processes_laws.two, 2)
+        changed = LAWS.replace("1e-3 * self.calls", "2e-3 * self.calls")
+        tl.campaign(spec(3), "a/camp", law="processes_laws:Counting", shards=1, worst=0)
+        self.laws.write_text(changed, encoding="utf-8")
+        plan = tl.CampaignFolder.plan(spec(3), "b/camp", law="processes_laws:Counting", shards=3)
+        plan.fly(0)
+        plan.fly_in_processes()
+        plan.merge(worst=0)
+        with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            pool.submit(tl.campaign, spec(3), "c/camp", law="processes_laws:Counting", worst=0).result(timeout=120)
+        self.assertEqual(self.files("b/camp"), self.files("c/camp"))
+        self.assertNotEqual(self.files("a/camp"), self.files("b/camp"))
+
+    def test_a_process_without_a_result_is_found(self) -> None:
+        self.laws.write_text(LAWS.replace('raise RuntimeError("no idea")', "__import__('os')._exit(0)"))
+        law = "processes_laws:Failing"
+        message = "their processes ended without a result"
+        self.refuses(tl.Error, message, lambda: tl.campaign(spec(), "-camp", law=law, threads=2, worst=0))
+
     def test_the_program_without_python_names_the_one_that_flies_it(self) -> None:
         program = ROOT / "target" / "debug" / "tautline"
         tl.CampaignFolder.plan(spec(), "camp", law="processes_laws:Counting")
@@ -126,17 +152,34 @@ class Processes(Case):
             ("processes_laws:Bare", TypeError, "gain"),
             ("no_such_module:Law", ModuleNotFoundError, "no_such_module"),
             ("sys:exit", tl.Error, "has no file"),
+            ("__main__:Law", tl.Error, "cannot import a script"),
         ):
             with self.subTest(name=name):
                 self.refuses(kind, message, lambda name=name: tl.campaign(spec(), "camp", law=name))
                 self.assertFalse((self.folder / "camp").exists())
-        self.refuses(tl.Error, "out: a folder is needed", lambda: tl.campaign(spec()))
+        self.refuses(tl.Error, "out: missing beside a dictionary", lambda: tl.campaign(spec()))
         self.refuses(TypeError, "MODULE:CLASS", lambda: tl.CampaignFolder.plan(spec(), "camp", law=Springs()))
         self.refuses(tl.Error, "no such campaign", lambda: tl.CampaignFolder("nowhere"))
         plan = tl.CampaignFolder.plan(spec(), "camp", shards=3)
         self.assertEqual((plan.path.name, plan.runs, plan.shards, plan.law), ("camp", 12, 3, None))
         self.refuses(tl.Error, "shards: must be below 3, got 3", lambda: plan.fly([0, 3]))
         self.refuses(tl.Error, "2 of 3 shards are missing", lambda: plan.fly(1) or plan.merge())
+
+    @unittest.skipUnless(os.name == "posix", "sends a signal")
+    def test_processes_end_with_the_one_that_started_them(self) -> None:
+        code = f"import tautline as tl; tl.campaign({spec(4000)!r}, 'camp', law='processes_laws:Counting', threads=2)"
+        pattern = f"tautline._shard_process {self.folder}"
+        listed = lambda: subprocess.run(["pgrep", "-f", pattern], capture_output=True, text=True).stdout  # noqa: E731
+        with subprocess.Popen([sys.executable, "-c", code]) as running:
+            self.wait(lambda: len(listed().split()) == 2)
+            running.kill()
+        self.wait(lambda: listed() == "")
+
+    def wait(self, what: Callable[[], bool]) -> None:
+        end_s = time.monotonic() + 60
+        while not what():
+            self.assertLess(time.monotonic(), end_s)
+            time.sleep(0.05)
 
     @unittest.skipUnless(os.name == "posix", "sends a signal")
     def test_ctrl_c_ends_all_processes_and_keeps_their_flights(self) -> None:
@@ -155,7 +198,7 @@ class Processes(Case):
             running.send_signal(signal.SIGINT)
             _, words = running.communicate(timeout=60)
         self.assertTrue(words.rstrip().endswith("KeyboardInterrupt"), words)
-        left = subprocess.run(["pgrep", "-f", f"campaign shard {self.folder}"], capture_output=True, text=True)
+        left = subprocess.run(["pgrep", "-f", f"tautline._shard_process {self.folder}"], capture_output=True, text=True)
         self.assertEqual(left.stdout, "")
         self.assertTrue(all(file.stat().st_size > 2000 for file in journals()))
 

@@ -52,7 +52,7 @@ def without_source(audit: tl.Audit) -> dict:
 
 def stored() -> list[str]:
     """Returns the temporary files of tables."""
-    return glob.glob(f"{glob.escape(tempfile.gettempdir())}/tautline-*.parquet")
+    return glob.glob(f"{glob.escape(tempfile.gettempdir())}/tautline-*/table.parquet")
 
 
 class Frames(Case):
@@ -228,12 +228,12 @@ class Lifetime(Case):
         self.assertEqual(stored(), [])
         audit = tl.audit(long(), delta=1.5)
         (file,) = stored()
-        self.assertEqual(Path(file).stat().st_mode & 0o077, 0)
+        self.assertEqual(Path(file).parent.stat().st_mode & 0o077, 0)
         audit.to_html(self.folder / "a.html")
         page = (self.folder / "a.html").read_text()
         self.assertIn("tautline.audit(table, delta=1.5)", page)
         for text in (page, json.dumps(audit.to_dict()), str(audit), repr(audit), audit._repr_html_()):
-            self.assertNotIn(Path(file).name, text)
+            self.assertNotIn(Path(file).parent.name, text)
         del audit
         gc.collect()
         self.assertEqual(stored(), [])
@@ -261,7 +261,33 @@ class Lifetime(Case):
         audit = tl.audit(long(), delta=1.5)
         again = pickle.loads(pickle.dumps(audit))
         self.assertEqual((again.verdict, again.to_dict()), (audit.verdict, audit.to_dict()))
-        self.refuses(tl.Error, "is not at hand here", lambda: again.to_html(self.folder / "a.html"))
+        self.refuses(tl.Error, "has no recording", lambda: again.to_html(self.folder / "a.html"))
+
+
+class Reviewed(Case):
+    """Tables that were read in a wrong way."""
+
+    def test_vehicles_with_names_of_axes_are_refused_or_read_by_their_level(self) -> None:
+        frame = long()
+        names = dict(zip(sorted(set(frame["id"])), "xyzw", strict=True))
+        frame["id"] = [names[vehicle] for vehicle in frame["id"]]
+        expected = tl.audit(frame, delta=1.5)
+        axis_first = frame.pivot(index="t", columns="id", values=["x", "y", "z"])
+        for table in (axis_first, axis_first.swaplevel(axis=1)):
+            found = tl.audit(table, delta=1.5)
+            self.assertEqual((found.verdict, found.separation_m), (expected.verdict, expected.separation_m))
+        only_axes = frame[frame["id"] != "w"].pivot(index="t", columns="id", values=["x", "y", "z"])
+        self.refuses(tl.Error, "both levels of the columns are axes", lambda: tl.audit(only_axes, delta=1.5))
+
+    def test_the_only_vehicle_of_a_table_has_a_name_that_stays(self) -> None:
+        frame = pandas.DataFrame({"t": [0.0, 1.0], "x": [0.0, 1.0], "y": 0.0, "z": 0.0})
+        one, other = (tl.audit(frame, limit={"speed": 5}) for _ in range(2))
+        self.assertEqual((one.vehicles, one.to_dict()), (["table"], other.to_dict()))
+
+    def test_times_that_wrap_are_refused(self) -> None:
+        t = np.array([2**63 - 1000, -(2**63) + 1000], dtype="datetime64[ns]")
+        self.refuses(tl.Error, "counts beyond 2^53", lambda: tl.audit(t, np.zeros((2, 2, 3)), delta=1.0))
+        self.refuses(TypeError, "join: only for files", lambda: tl.audit(long(), delta=1.5, join=True))
 
 
 if __name__ == "__main__":

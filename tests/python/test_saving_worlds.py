@@ -121,15 +121,39 @@ class Worlds(Case):
         sim.step(commands(sim, 1))
         self.assertEqual(bits(tl.VectorSimulation.load(sim.save())), bits(sim))
 
+    def test_arrays_of_the_simulation_itself_are_kept_as_they_were(self) -> None:
+        sets = {"time.duration_s": 1.1, "start.jitter_m": 0.1}
+        sim = tl.VectorSimulation("pentagon", 3, keep_history=True, set=sets)
+        sim.step(commands(sim, 1), steps=5)
+        for _ in range(4):
+            sim.step(sim.velocities, steps=3)
+        sim.reset([True, False, True])
+        sim.step(commands(sim, 2), steps=264 - 17)
+        self.assertEqual(sim.is_over.tolist(), [False, True, False])
+        sim.reset(sim.is_over)
+        sim.step(commands(sim, 3), steps=10)
+        again = tl.VectorSimulation.load(sim.save())
+        self.assertEqual(bits(again), bits(sim))
+        self.assertEqual(continued(again), continued(sim))
+        env = FormationVectorEnv("pentagon", 2, autoreset_mode="Disabled", set=sets)
+        env.reset(seed=1)
+        first = env.sim.seeds.tolist()
+        for _ in range(22):
+            *_, truncated, _ = env.step(np.zeros(env.action_space.shape))
+        self.assertTrue(truncated.all())
+        env.reset(options={"reset_mask": env.sim.is_over})
+        self.assertFalse(set(first) & set(env.sim.seeds.tolist()))
+        env.step(np.zeros(env.action_space.shape))
+
     def test_damaged_bytes_are_refused(self) -> None:
         saved = self.flown("pentagon", {}).save()
         for cut in range(0, len(saved), 997):
             part = saved[:cut]
-            self.refuses(tl.Error, "data: these are no saved worlds", lambda part=part: tl.VectorSimulation.load(part))
+            self.refuses(tl.Error, "data: not the bytes of save()", lambda part=part: tl.VectorSimulation.load(part))
         for place in range(0, len(saved), 997):
             changed = bytearray(saved)
             changed[place] ^= 4
-            self.refuses(tl.Error, "no saved worlds", lambda changed=changed: tl.VectorSimulation.load(changed))
+            self.refuses(tl.Error, "not the bytes of save()", lambda changed=changed: tl.VectorSimulation.load(changed))
         self.refuses(TypeError, "bytes are needed", lambda: tl.VectorSimulation.load("worlds"))
 
 

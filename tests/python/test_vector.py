@@ -295,7 +295,7 @@ class WrongInput(Case):
             lambda: tl.compare(scenario, ["laplacian"], runs=1),
             lambda: tl.attack(scenario, start=0.1, flights=1),
         ):
-            self.refuses(tl.Error, "has changed since it was read; create a new Scenario", use)
+            self.refuses(tl.Error, "a file has changed since it was read; create a new Scenario", use)
         file.unlink()
         self.refuses(FileNotFoundError, "own.toml", lambda: tl.fly(scenario))
 
