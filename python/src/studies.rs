@@ -40,10 +40,10 @@ fn answered<T: Send>(
     let monitor = StudyMonitor::new(progress, has_law);
     let answer = if has_law {
         let (answer, raised) = run_detached(py, || catch_exception(|| work(&monitor)))?;
-        monitor.report(py)?;
-        if let Some(raised) = monitor.raised().or(raised) {
+        if let Some(raised) = monitor.take_raised().or(raised) {
             return Err(raised);
         }
+        monitor.report(py)?;
         answer
     } else {
         let answer = run_study(py, &monitor, || work(&monitor))?;
@@ -345,7 +345,7 @@ impl CampaignFolder {
         let load = |name: &str| {
             name.contains(':').then(|| {
                 load_law(py, name).map_err(|error| {
-                    let failure = Failure::input("request/python-law", error.to_string(), "mend the module");
+                    let failure = Failure::input("request/python-law", error.to_string(), "correct the module");
                     **law.borrow_mut() = Some(error);
                     failure
                 })

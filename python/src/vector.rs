@@ -190,7 +190,7 @@ impl VectorSimulation {
             let template = template.map_err(tautline::scenario::ScenarioError::into_exception)?;
             if template.own() != &scenario.scenario {
                 return Err(wrong_input(format!(
-                    "{}: has changed since it was read; create a new Scenario",
+                    "{}: a file has changed since it was read; create a new Scenario",
                     request.argument
                 )));
             }

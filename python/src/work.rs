@@ -190,9 +190,9 @@ impl StudyMonitor {
         progress.call1(py, (total.map_or(now.0, |total| total.min(now.0)), total)).map(drop)
     }
 
-    /// Returns the exception that a signal or the function of the progress raised on the calling thread.
-    pub(crate) fn raised(self) -> Option<PyErr> {
-        self.signals?.into_inner().unwrap_or_else(PoisonError::into_inner).raised
+    /// Takes the exception that a signal or the function of the progress raised on the calling thread.
+    pub(crate) fn take_raised(&self) -> Option<PyErr> {
+        self.signals.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner).raised.take()
     }
 }
 

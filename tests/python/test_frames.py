@@ -284,6 +284,23 @@ class Reviewed(Case):
         one, other = (tl.audit(frame, limit={"speed": 5}) for _ in range(2))
         self.assertEqual((one.vehicles, one.to_dict()), (["table"], other.to_dict()))
 
+    def test_integers_that_would_be_rounded_are_refused(self) -> None:
+        whole = [2**53 + 1, 2**53 + 3]
+        table = {"t": [0, 0, 1, 1], "id": ["a", "b"] * 2, "y": [0.0] * 4, "z": [0.0] * 4}
+        message = "integer"
+        for kind in (pyarrow.int64(), pyarrow.uint64()):
+            frame = pyarrow.table({**table, "x": pyarrow.array(whole * 2, kind)})
+            self.refuses(tl.Error, message, lambda frame=frame: tl.audit(frame, delta=3.0, time_unit="s"))
+            file = self.folder / "large.parquet"
+            pyarrow.parquet.write_table(frame, file)
+            self.refuses(tl.Error, "that would be rounded", lambda file=file: tl.audit(file, delta=3.0, time_unit="s"))
+        even = pyarrow.table({**table, "x": pyarrow.array([2**53 + 2, 2**53 + 8] * 2, pyarrow.int64())})
+        self.assertEqual(tl.audit(even, delta=3.0, time_unit="s").separation_m, 6.0)
+        positions = np.zeros((5, 2, 3), dtype=np.int64)
+        positions[:, :, 0] = whole
+        np.savez(self.folder / "large.npz", t=np.arange(5.0), positions=positions)
+        self.refuses(tl.Error, "which would be rounded", lambda: tl.audit(self.folder / "large.npz", delta=3.0))
+
     def test_times_that_wrap_are_refused(self) -> None:
         t = np.array([2**63 - 1000, -(2**63) + 1000], dtype="datetime64[ns]")
         self.refuses(tl.Error, "counts beyond 2^53", lambda: tl.audit(t, np.zeros((2, 2, 3)), delta=1.0))

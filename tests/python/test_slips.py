@@ -197,7 +197,7 @@ class Kept(Case):
         a = tl.audit(*passing(), delta=1.5)
         sent = pickle.loads(pickle.dumps(a))
         self.assertEqual((sent.headline, sent.to_dict()), (a.headline, a.to_dict()))
-        self.refuses(tl.Error, "not at hand here", lambda: sent.to_html(self.folder / "a.html"))
+        self.refuses(tl.Error, "has no recording", lambda: sent.to_html(self.folder / "a.html"))
         with self.assertRaises(tl.ViolationError) as caught:
             a.raise_for_violation()
         self.assertEqual(str(pickle.loads(pickle.dumps(caught.exception))), str(caught.exception))

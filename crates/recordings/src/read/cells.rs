@@ -73,11 +73,12 @@ impl<T: AsRef<[u8]>> Cell<T> {
         })
     }
 
-    /// Returns the number in a cell, which may be written as text.
+    /// Returns the number in a cell, which may be written as text; `None` for an integer that would be rounded.
+    #[expect(clippy::cast_possible_truncation, reason = "a number of at most 2^64")]
     pub(super) fn number(&self) -> Option<f64> {
         match self {
             Self::Empty => None,
-            Self::Whole(whole) => Some(*whole as f64),
+            Self::Whole(whole) => Some(*whole as f64).filter(|number| *number as i128 == *whole),
             Self::Real(real) => Some(*real),
             Self::Text(text) => str::from_utf8(text.as_ref()).ok()?.trim().parse().ok(),
         }
@@ -118,6 +119,9 @@ pub(super) fn parse_number(column: impl fmt::Display, text: &str, unseen: &str) 
     };
     match text.parse::<f64>() {
         _ if text.is_empty() => Ok(None),
+        Ok(_) if is_rounded(text) => {
+            holds(ContentKind::Overflow, "an integer beyond 2^53 that would be rounded", "subtract an offset first")
+        }
         Ok(number) if number.is_finite() => Ok(Some(number)),
         Ok(_) => Err(Fault::not_finite(column, text, unseen)),
         Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => {
@@ -125,6 +129,12 @@ pub(super) fn parse_number(column: impl fmt::Display, text: &str, unseen: &str) 
         }
         Err(_) => holds(ContentKind::NotANumber, "which is not a number", "write a number with a decimal point"),
     }
+}
+
+/// Returns whether a text is an integer that a number of 64 bits rounds.
+#[expect(clippy::cast_possible_truncation, reason = "a larger number is not equal")]
+fn is_rounded(text: &str) -> bool {
+    text.parse::<i128>().is_ok_and(|whole| whole as f64 as i128 != whole)
 }
 
 /// Returns three numbers; `None` if all cells are empty.

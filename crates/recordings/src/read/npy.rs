@@ -9,7 +9,7 @@ use std::io::Read;
 
 use super::cells::Cell;
 use super::clock::Stamp;
-use super::error::{ContentKind, Fault};
+use super::error::{ContentKind, Fault, refuse};
 use super::time_unit::TimeUnit;
 
 /// First bytes of an array.
@@ -134,6 +134,12 @@ impl Array {
     /// Returns the next element as a number.
     pub(super) fn next_number(&mut self) -> Result<f64, Fault> {
         let cell = self.next()?;
+        if let Cell::Whole(whole) = cell
+            && cell.number().is_none()
+        {
+            let problem = format!("it holds the integer {whole}, which would be rounded");
+            return refuse(ContentKind::Overflow, problem, "subtract an offset first");
+        }
         cell.number().filter(|_| !matches!(cell, Cell::Text(_))).ok_or_else(|| not("numbers", "text"))
     }
 

@@ -150,12 +150,16 @@ pub fn campaign(
     merge(&folder, request.worst, pictures, monitor)
 }
 
-/// Flies shards of a campaign. Returns whether all were flown; `false` after an interruption.
+/// Flies shards of a campaign, on one thread if its law requires that. Returns whether all were flown; `false` after an
+/// interruption.
 ///
 /// # Errors
 /// As [`Folder::fly`].
 pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn Monitor) -> Result<bool, Failure> {
-    let batch = Batch::for_laws(Some(threads), monitor, folder.campaign().external_law())?;
+    let law = folder.campaign().external_law();
+    // Schedulers give the number of threads of a task, whatever its law.
+    let threads = if law.is_some_and(ExternalLaw::requires_calling_thread) { 1 } else { threads };
+    let batch = Batch::for_laws(Some(threads), monitor, law)?;
     let manifest = folder.campaign().manifest();
     let runs = shards.iter().map(|&shard| manifest.range(shard)).map(|range| range.end - range.start).sum();
     monitor.begin(&manifest.name, Some(folder.campaign().steps(runs)));
