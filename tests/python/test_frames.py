@@ -299,7 +299,8 @@ class Reviewed(Case):
         positions = np.zeros((5, 2, 3), dtype=np.int64)
         positions[:, :, 0] = whole
         np.savez(self.folder / "large.npz", t=np.arange(5.0), positions=positions)
-        self.refuses(tl.Error, "which would be rounded", lambda: tl.audit(self.folder / "large.npz", delta=3.0))
+        self.refuses(tl.Error, "which would be rounded", lambda: tl.audit(
+            self.folder / "large.npz", delta=3.0, layout="time,vehicle,axis"))  # fmt: skip
 
     def test_times_that_wrap_are_refused(self) -> None:
         t = np.array([2**63 - 1000, -(2**63) + 1000], dtype="datetime64[ns]")
