@@ -605,16 +605,19 @@ Qed.
 
 (** ** Statements *)
 
-(** Lemma 3. If both vehicles hold the same starts, they hold a common plane at every time. *)
-Theorem common_plane : forall facts s,
-  reachable contract_rules facts facts s -> have_common_plane s.
+Lemma invariant_has_common_plane : forall h s, invariant h s -> have_common_plane s.
 Proof.
-  intros facts s R. apply invariant_is_reachable in R. destruct R as ((_ & _ & P & _) & _).
+  intros h s ((_ & _ & P & _) & _).
   exists (f_held (follower s)). split; [|now left].
   unfold planes_fit in P. unfold owner_planes. destruct (o_pending (owner s)) as [d|].
   - destruct P as [[_ ->] | (_ & _ & ->)]; [now left|]. destruct (d_accepted _); simpl; auto.
   - destruct P as [_ ->]. now left.
 Qed.
+
+(** Lemma 3. If both vehicles hold the same starts, they hold a common plane at every time. *)
+Theorem common_plane : forall facts s,
+  reachable contract_rules facts facts s -> have_common_plane s.
+Proof. intros facts s R. eapply invariant_has_common_plane, invariant_is_reachable, R. Qed.
 
 (** Lemma 2. At every time all planes of both vehicles contain the segments of their periods. *)
 Theorem segments_are_inside : forall facts s,
