@@ -98,7 +98,7 @@ Record followed := {
   f_decided : decision }.
 
 (** Segments of a vehicle at its last instant and at its next one (`Shield::segment` before and after
-    `Shield::command`). The path of the period is in the convex hull of both ([brake.path_is_within]). *)
+    `Shield::command`). The path of the period is in the convex hull of both ([geometry.path_is_within]). *)
 Record motion := { now : Segment; next : Segment }.
 
 (** Planes that the owner respects: those that `Owned::look` adds, whether within reach or not. *)
