@@ -1,0 +1,61 @@
+#!/bin/sh
+# Checks the proofs. From anywhere: sh proofs/check.sh [--accept]
+#
+# Compiles all files, checks them again with coqchk, and compares the axioms of each theorem with assumptions.txt.
+# --accept writes assumptions.txt. Then copies with a defect must fail. Needs the Debian package coq.
+set -eu
+cd "$(dirname "$0")"
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+# Compiles and checks the files of a folder: check FOLDER. Writes FOLDER/found, one line for each theorem.
+check() (
+    cd "$1"
+    files=$(coqdep -R . Proofs -sort ./*.v | tr ' ' '\n' | sed 's|.*/||; s|\.v$||; /^$/d')
+    for file in $files; do
+        coqc -q -R . Proofs "$file.v" || return 1
+    done
+    # The standard library is not checked again: this takes another half minute.
+    coqchk -silent -R . Proofs $(for file in $files; do echo "-norec Proofs.$file"; done) || return 1
+    for file in $files; do
+        echo "From Proofs Require $file."
+        sed -n "s/^Theorem \([A-Za-z0-9_]*\).*/Goal True. idtac \"theorem $file.\1\". Abort.\nPrint Assumptions $file.\1./p" \
+            "$file.v"
+    done >assumptions_of_all.v
+    coqc -q -R . Proofs assumptions_of_all.v >printed || return 1
+    # Names of axioms begin in the first column, and their types go on in the next lines.
+    awk '
+        function end() { if (name != "") print name ": " (axioms == "" ? "no axioms" : substr(axioms, 2)) }
+        /^theorem / { end(); name = $2; axioms = ""; next }
+        /^(Axioms:|Closed under|[[:space:]])/ || NF == 0 { next }
+        { axioms = axioms " " $1 }
+        END { end() }' printed >found
+)
+
+mkdir "$scratch/proofs"
+cp ./*.v "$scratch/proofs"
+check "$scratch/proofs"
+[ "${1:-}" != --accept ] || cp "$scratch/proofs/found" assumptions.txt
+if ! diff assumptions.txt "$scratch/proofs/found"; then
+    echo "proofs: the theorems or their axioms changed; if this is intended, run sh proofs/check.sh --accept" >&2
+    exit 1
+fi
+
+# A copy with a defect must fail: mutant NAME 'COMMANDS OF SED for contract.v'
+mutant() {
+    mkdir "$scratch/$1"
+    sed "$2" contract.v >"$scratch/$1/contract.v"
+    ! cmp -s contract.v "$scratch/$1/contract.v" || { echo "mutant $1: the text to be changed is missing" >&2 && exit 1; }
+    grep '^contract\.' assumptions.txt >"$scratch/expected"
+    if check "$scratch/$1" >"$scratch/output" 2>&1 && diff "$scratch/expected" "$scratch/$1/found" >"$scratch/output"; then
+        echo "mutant $1: not found" >&2
+        exit 1
+    fi
+    echo "mutant $1: found, $(grep -m 1 -e '^>' -e '^File' "$scratch/output")"
+}
+proof='^Proof\. intros facts s R\. eapply invariant_has_common_plane.*'
+mutant admitted "s/$proof/Admitted./"
+mutant axiom "s/$proof/Proof. intros. apply shortcut. Qed./
+    s/^Theorem common_plane /Axiom shortcut : forall s, have_common_plane s.\n&/"
+mutant defect 's/ matches_number := true;/ matches_number := false;/'
+echo "proofs: $(wc -l <assumptions.txt) theorems hold, $(grep -c 'no axioms' assumptions.txt) of them without axioms"
