@@ -19,8 +19,9 @@ check() (
     coqchk -silent -R . Proofs $(for file in $files; do echo "-norec Proofs.$file"; done) || return 1
     for file in $files; do
         echo "From Proofs Require $file."
-        sed -n "s/^Theorem \([A-Za-z0-9_]*\).*/Goal True. idtac \"theorem $file.\1\". Abort.\nPrint Assumptions $file.\1./p" \
-            "$file.v"
+        sed -n 's/^Theorem \([A-Za-z0-9_]*\).*/\1/p' "$file.v" | while read -r name; do
+            echo "Goal True. idtac \"theorem $file.$name\". Abort. Print Assumptions $file.$name."
+        done
     done >assumptions_of_all.v
     coqc -q -R . Proofs assumptions_of_all.v >printed || return 1
     # Names of axioms begin in the first column, and their types go on in the next lines.
@@ -45,9 +46,13 @@ fi
 mutant() {
     mkdir "$scratch/$1"
     sed "$2" contract.v >"$scratch/$1/contract.v"
-    ! cmp -s contract.v "$scratch/$1/contract.v" || { echo "mutant $1: the text to be changed is missing" >&2 && exit 1; }
+    if cmp -s contract.v "$scratch/$1/contract.v"; then
+        echo "mutant $1: the text to be changed is missing" >&2
+        exit 1
+    fi
     grep '^contract\.' assumptions.txt >"$scratch/expected"
-    if check "$scratch/$1" >"$scratch/output" 2>&1 && diff "$scratch/expected" "$scratch/$1/found" >"$scratch/output"; then
+    if check "$scratch/$1" >"$scratch/output" 2>&1 &&
+        diff "$scratch/expected" "$scratch/$1/found" >"$scratch/output"; then
         echo "mutant $1: not found" >&2
         exit 1
     fi

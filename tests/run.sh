@@ -10,7 +10,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 
-all="crates ignored bits film fuzz mutants ci cluster docs readers python"
+all="crates ignored bits film fuzz mutants proofs ci cluster docs readers python"
 # The Python package and the fuzz targets have tests of their own.
 rust="--workspace --exclude tautline-python --exclude tautline-fuzz"
 
@@ -42,6 +42,9 @@ with_program() {
     cargo build --quiet $rust --bin tautline
     "target/$1/bin/python" -m unittest discover --verbose --start-directory "$2"
 }
+
+# The proofs of the contract of the shield, and copies with a defect.
+proofs() { sh proofs/check.sh; }
 
 # The GitHub action, hook and archives, and packages.
 ci() { with_program cluster tests/ci; }

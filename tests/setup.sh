@@ -51,6 +51,11 @@ if needed_by crates ignored film; then
         debian xvfb xdotool libx11-6 libx11-xcb1 libxcursor1 libxi6 libxrandr2 libxkbcommon-x11-0
 fi
 
+# The checker of proofs/.
+if needed_by proofs; then
+    has coqc && has coqchk || debian coq
+fi
+
 # Builds a program from source into target/FOLDER/bin: tool FOLDER PROGRAM [options of cargo install] NAME@VERSION
 # All checkouts of a user share it.
 tool() {
