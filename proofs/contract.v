@@ -482,7 +482,8 @@ Lemma owner_message_holds : forall h o o' f messages stamp,
   contract_holds h o f (messages ++ [owner_message stamp o']).
 Proof.
   intros h o o' f messages stamp (Ho & Hf & Hp & Hd & Hq & Hm) (S1 & S2 & S3 & S4).
-  refine (conj Ho (conj Hf (conj Hp (conj Hd (conj Hq _))))). intros m Hin. apply in_app_or in Hin. destruct Hin as [Hin | [Hin | []]]; auto.
+  refine (conj Ho (conj Hf (conj Hp (conj Hd (conj Hq _))))).
+  intros m Hin. apply in_app_or in Hin. destruct Hin as [Hin | [Hin | []]]; auto.
   subst m. intros _. simpl. destruct (o_pending o') as [d|]; auto.
   destruct (is_void (o_agreement o')); auto. right. auto.
 Qed.
@@ -492,7 +493,8 @@ Lemma follower_message_holds : forall h o f f' messages stamp,
   contract_holds h o f (messages ++ [follower_message stamp f']).
 Proof.
   intros h o f f' messages stamp (Ho & Hf & Hp & Hd & Hq & Hm) (S1 & S2 & S3).
-  refine (conj Ho (conj Hf (conj Hp (conj Hd (conj Hq _))))). intros m Hin. apply in_app_or in Hin. destruct Hin as [Hin | [Hin | []]]; auto.
+  refine (conj Ho (conj Hf (conj Hp (conj Hd (conj Hq _))))).
+  intros m Hin. apply in_app_or in Hin. destruct Hin as [Hin | [Hin | []]]; auto.
   subst m. intros _. simpl. destruct (0 <? d_number (f_decided f')); auto.
   rewrite <- S3. split; auto.
 Qed.

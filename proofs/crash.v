@@ -1,9 +1,9 @@
 (** * Crash and return of a vehicle
 
-    A vehicle whose computer restarts loads a saved contract (`Shield::save`, `SavedShield::load`) and continues. Lemma 3
-    still holds under one rule, [contract.saves_first]: the vehicle saves its contract after each change, before it sends
-    a message and before it takes a command. [without_saving_first] and [without_saved_contract] show that the rule is
-    needed.
+    A vehicle whose computer restarts loads a saved contract (`Shield::save`, `SavedShield::load`) and continues.
+    Lemma 3 still holds under one rule, [contract.saves_first]: the vehicle saves its contract after each change, before
+    it sends a message and before it takes a command. [without_saving_first] and [without_saved_contract] show that the
+    rule is needed. The code does not save by itself: the rule is one for its caller.
 
     The model covers the contract. It does not cover the flight while the computer is off: the vehicle must stay in its
     reserved segments, and the loaded reference must be that of the vehicle. *)

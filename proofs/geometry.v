@@ -1,8 +1,8 @@
 (** * Planes, paths and the brake, over the real numbers
 
     Lemma 1 and the last step of the theorem of `docs/shield.md`. All lengths are those of the metric of the pair
-    (`plane::Metric`): true lengths for balls, scaled ones for ellipsoids. Doubles are not modelled: the margin for rounding
-    of `settings.rs` covers them. *)
+    (`plane::Metric`): true lengths for balls, scaled ones for ellipsoids. Doubles are not modelled: the margin for
+    rounding of `settings.rs` covers them. *)
 
 From Coq Require Import Reals Lra.
 Open Scope R_scope.
@@ -89,12 +89,14 @@ Definition whole_periods (b h : R) (m : nat) (speed : R) : Prop :=
 
 (** G >= h / 2. *)
 Theorem glide_is_at_least_half_a_period : forall b h m speed,
-  0 < b -> 0 < h -> 0 < speed -> whole_periods b h m speed -> h / 2 <= glide b h m speed.
+  0 < b -> 0 < h -> whole_periods b h m speed -> h / 2 <= glide b h m speed.
 Proof.
-  intros b h m speed B H V [L _]. unfold glide.
+  intros b h m speed B H [L _]. unfold glide.
   destruct m as [|m].
   - simpl. unfold Rdiv. rewrite Rmult_0_r, !Rmult_0_l. lra.
   - rewrite S_INR in *. set (k := INR m) in *. assert (K : 0 <= k) by apply pos_INR.
+    assert (V : 0 < speed).
+    { assert (0 < b * h) by (apply Rmult_lt_0_compat; auto). nra. }
     assert (T : b * h * h * (k + 1) * (k + 1 + 1) / (2 * speed) <= h * (k + 1 + 1) / 2).
     { apply Rmult_le_reg_r with (2 * speed); [lra|].
       unfold Rdiv at 1. rewrite Rmult_assoc, Rinv_l, Rmult_1_r by lra.
@@ -163,7 +165,7 @@ Proof.
       { apply Rmult_le_reg_r with (2 * speed); [lra|]. unfold Rdiv at 1.
         rewrite Rmult_assoc, Rinv_l, Rmult_1_r by lra.
         replace (h / 2 * (2 * speed)) with (speed * h) by field. apply Rmult_le_compat_r; lra. }
-      assert (h / 2 <= glide b h m (speed - b * h)) by (apply glide_is_at_least_half_a_period; auto; lra).
+      assert (h / 2 <= glide b h m (speed - b * h)) by now apply glide_is_at_least_half_a_period.
       assert (0 <= k * glide b h m (speed - b * h)) by (apply Rmult_le_pos; lra).
       lra.
     + by_axes; field; lra.
@@ -229,8 +231,8 @@ Qed.
 Definition is_within (p s p' s' point : vector) : Prop :=
   forall n c, dot n p <= c -> dot n s <= c -> dot n p' <= c -> dot n s' <= c -> dot n point <= c.
 
-(** Lemma 1. The path of a period is in each half-space with its begin, its stop point and its end. It is a Bezier curve,
-    and its second control point is in the segment to the stop point because G >= h / 2. *)
+(** Lemma 1. The path of a period is in each half-space with its begin, its stop point and its end. It is a Bezier
+    curve, and its second control point is in the segment to the stop point because G >= h / 2. *)
 Theorem path_is_within : forall s u g h t s',
   0 < h -> h / 2 <= g -> 0 <= t <= h ->
   is_within (position s) (add (position s) (scale g (velocity s))) (position (after s u h)) s' (position (after s u t)).

@@ -39,7 +39,8 @@ Definition have_passed (s : state nat nat) : Prop :=
 (** Two vehicles without a common plane that have passed each other. *)
 Definition is_broken (s : state nat nat) : Prop := ~ have_common_plane _ _ s /\ have_passed s.
 
-Ltac no_plane := intros (d & O & F); simpl in O, F; repeat (destruct O as [<- | O]; [destruct F as [F | []]; discriminate|]); destruct O.
+Ltac no_plane := intros (d & O & F); simpl in O, F;
+  repeat (destruct O as [<- | O]; [destruct F as [F | []]; discriminate|]); destruct O.
 
 (** Runs steps from a start, and gives the last state. *)
 Ltac trace a b messages events :=
@@ -99,7 +100,8 @@ Qed.
 Theorem without_new_flight : exists m s,
   m_starts _ m = hash Here /\
   run_with contract_rules (start Here Here [m])
-    [RenewOwner _ _ (Some 9); HearOwner _ _ 0; RenewOwner _ _ None; CommandOwner _ _ 9; CommandFollower _ _ 5] = Some s /\
+    [RenewOwner _ _ (Some 9); HearOwner _ _ 0; RenewOwner _ _ None; CommandOwner _ _ 9; CommandFollower _ _ 5] =
+    Some s /\
   is_broken s.
 Proof.
   exists {| m_stamp := 1; m_starts := 1; m_body := FollowerBody _ (Some {| d_number := 1; d_accepted := true |}) |}.
