@@ -113,8 +113,11 @@ impl Shield {
         Ok(shield)
     }
 
-    /// Returns the state of this shield, to be continued in another process. Of a shield and its copies only one may
-    /// fly on. `None` for a shield with obstacles.
+    /// Returns the state of this shield, to be continued in another process. `None` for a shield with obstacles.
+    ///
+    /// Of a shield and its copies only one may fly on. A vehicle that may return from a crash saves after each
+    /// [`Shield::filter`], before it sends the messages and applies the command: the others may already rely on what it
+    /// has sent.
     #[must_use]
     pub fn save(&self) -> Option<SavedShield> {
         self.keep_outs.is_empty().then(|| SavedShield {

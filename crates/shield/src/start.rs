@@ -59,6 +59,9 @@ impl Start {
     pub const BYTES: usize = 16 + 8 * NUMBERS;
 
     /// Returns this start with another number of the flight. [`Limits::start`](crate::Limits::start) gives 0.
+    ///
+    /// Vehicles whose messages of earlier flights may still arrive need a number that no earlier flight from the same
+    /// starts had, such as the time of the flight.
     #[must_use]
     pub fn with_flight(self, flight: u64) -> Self {
         Self { flight, ..self }
