@@ -116,8 +116,7 @@ impl Shield {
     /// Returns the state of this shield, to be continued in another process. `None` for a shield with obstacles.
     ///
     /// Of a shield and its copies only one may fly on. A vehicle that may return from a crash saves after each
-    /// [`Shield::filter`], before it sends the messages and applies the command: the others may already rely on what it
-    /// has sent.
+    /// [`Shield::filter`], before it sends the messages and applies the command. The others rely on what it has sent.
     #[must_use]
     pub fn save(&self) -> Option<SavedShield> {
         self.keep_outs.is_empty().then(|| SavedShield {
