@@ -32,7 +32,7 @@ HZ, ACCEL_M_S2 = 20.0, 2.0
 #: Number of nearest vehicles and obstacles that a vehicle observes.
 NEAREST = 4
 #: Vehicles of the training in all worlds, steps of single vehicles, and episodes of an evaluation.
-VEHICLES, STEPS, EPISODES = 192, 4_000_000, 200
+VEHICLES, STEPS, EPISODES = 192, 2_500_000, 200
 #: Seed of the evaluation.
 UNSEEN = 10**9
 
@@ -109,7 +109,7 @@ class Nearest(Observation):
 
 
 class Arrive(Reward):
-    """exp(-d / 2 m) for the distance d to the slot, so that a whole flight is worth more than a part.
+    """1 / (1 + d / 2 m) for the distance d to the slot, so that a whole flight is worth more than a part.
 
     A violation costs a vehicle 50 if it is within 0.5 m of a limit, else 5. ``of_vehicles`` keeps the rewards.
     """
@@ -119,7 +119,7 @@ class Arrive(Reward):
     def __call__(self, worlds: Worlds) -> Array:
         distance = np.linalg.norm(worlds.slots_m - worlds.positions, axis=-1)
         blame = np.where(clearances(worlds) < 0.5, 50.0, 5.0)
-        self.of_vehicles = np.exp(-distance / 2.0) - blame * worlds.violated[:, None]
+        self.of_vehicles = 1.0 / (1.0 + distance / 2.0) - blame * worlds.violated[:, None]
         return self.of_vehicles
 
 
