@@ -39,6 +39,9 @@ def exact_array(value: object, what: str) -> NDArray[np.float64]:
     An array of float64 is returned as it is. Raises ``TypeError`` for other kinds of numbers and :class:`Error` for
     integers that float64 cannot hold.
     """
+    # No masked array, and no conversion: calls that step a simulation pass here.
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
     array = value if isinstance(value, np.ndarray) else foreign_array(value, what)
     if isinstance(array, np.ma.MaskedArray):
         raise TypeError(f"{what}: a masked array has unknown numbers; give it as .filled(numpy.nan)")
