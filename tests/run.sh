@@ -60,8 +60,9 @@ docs() {
 # Exported files with the libraries of their formats.
 readers() { with_program readers tests/readers; }
 
-# The Python package, in a debug build, with its notebooks.
+# The Python package, in a debug build, with its notebooks. The program of the same sources continues its campaigns.
 python() {
+    cargo build --quiet $rust --bin tautline
     VIRTUAL_ENV="$PWD/target/python" target/python/bin/maturin develop --manifest-path python/Cargo.toml
     TAUTLINE_NOTEBOOKS=yes target/python/bin/python -m unittest discover --verbose --start-directory tests/python
 }
