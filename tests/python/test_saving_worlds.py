@@ -127,6 +127,8 @@ class Worlds(Case):
         sim.step(commands(sim, 1), steps=5)
         for _ in range(4):
             sim.step(sim.velocities, steps=3)
+        # Resets would hide wrong accelerations.
+        self.assertEqual(bits(tl.VectorSimulation.load(sim.save())), bits(sim))
         sim.reset([True, False, True])
         sim.step(commands(sim, 2), steps=264 - 17)
         self.assertEqual(sim.is_over.tolist(), [False, True, False])
