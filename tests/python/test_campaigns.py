@@ -167,16 +167,18 @@ class Processes(Case):
 
     @unittest.skipUnless(os.name == "posix", "sends a signal")
     def test_processes_end_with_the_one_that_started_them(self) -> None:
-        code = f"import tautline as tl; tl.campaign({spec(4000)!r}, 'camp', law='processes_laws:Counting', threads=2)"
+        # Each shard would fly for minutes.
+        given = f"{spec(200_000)!r}, 'camp', law='processes_laws:Counting', threads=2, shards=2"
+        code = f"import tautline as tl; tl.campaign({given})"
         pattern = f"tautline._shard_process {self.folder}"
         listed = lambda: subprocess.run(["pgrep", "-f", pattern], capture_output=True, text=True).stdout  # noqa: E731
         with subprocess.Popen([sys.executable, "-c", code]) as running:
             self.wait(lambda: len(listed().split()) == 2)
             running.kill()
-        self.wait(lambda: listed() == "")
+        self.wait(lambda: listed() == "", 20)
 
-    def wait(self, what: Callable[[], bool]) -> None:
-        end_s = time.monotonic() + 60
+    def wait(self, what: Callable[[], bool], within_s: float = 60) -> None:
+        end_s = time.monotonic() + within_s
         while not what():
             self.assertLess(time.monotonic(), end_s)
             time.sleep(0.05)
