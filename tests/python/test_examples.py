@@ -3,6 +3,7 @@
 import os
 import sys
 import unittest
+import unittest.mock
 
 import nbformat
 import numpy as np
@@ -61,6 +62,10 @@ class Recipes(unittest.TestCase):
         self.assertEqual(train_ppo.evaluate("swap", train_ppo.spring, True, 6, 3).returned,
                          train_ppo.evaluate("swap", train_ppo.spring, True, 6, 3).returned)  # fmt: skip
         self.assertIn("0 violated", str(shielded))
+        # A check that sees nothing misses every violation.
+        with unittest.mock.patch.object(train_ppo, "clearances", lambda worlds: np.ones(worlds.positions.shape[:2])):
+            blind = train_ppo.evaluate("swap", train_ppo.spring, False, 6)
+        self.assertEqual((blind.violations, blind.missed), (6, 6))
 
     def test_an_observation_has_the_nearest_vehicles_first(self) -> None:
         env = train_ppo.environment("formation", 3, "NextStep")
