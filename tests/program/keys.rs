@@ -303,11 +303,10 @@ fn every_key_of_a_campaign_is_on_its_page() {
 fn every_code_of_a_warning_is_on_its_page() {
     use tautline::preflight::Code;
     for code in Code::ALL {
-        let refuses = if code.refuses() { "yes" } else { "no" };
+        let mark = if code.refuses() { " *" } else { "" };
+        let begin = format!("| `{}`{mark} |", code.name());
         let mut rows = section(CODES, "\n## ", "Warnings of a check").lines();
-        let is_row =
-            |row: &str| row.starts_with(&format!("| `{}` |", code.name())) && row.ends_with(&format!(" {refuses} |"));
-        assert!(rows.any(is_row), "{}", code.name());
+        assert!(rows.any(|row| row.starts_with(&begin)), "{}", code.name());
     }
 }
 
