@@ -1,5 +1,4 @@
-//! Prints the table of tests/reports/attacks.md, CMA-ES and random search, or with `laws` that of docs/studies.md: the
-//! worst start of each law.
+//! Prints the tables of tests/reports/attacks.md: CMA-ES and random search, or with `laws` the worst start of each law.
 //!
 //! `cargo run --release --example attacks [laws]`
 

@@ -1,5 +1,5 @@
-//! Tables of searches: CMA-ES compared with uniform random search (tests/reports/attacks.md), and the worst start found
-//! for each law (docs/studies.md).
+//! Tables of tests/reports/attacks.md: CMA-ES compared with uniform random search, and the worst start found for each
+//! law.
 
 use tautline::attack::{Attack, Bound, Options, SearchSpace};
 use tautline::request::{ScenarioRequest, Silent};
