@@ -51,5 +51,4 @@ LONG = {
 # Built programs that run in place of cargo.
 INSTEAD = {
     "cargo run --release --example own_law": "debug/examples/own_law",
-    "cargo run --release --package example-shield": "debug/example-shield",
 }
