@@ -4,10 +4,8 @@
 use std::fs;
 use std::path::Path;
 
-const PAGE: &str = include_str!("../docs/validation.md");
-
 #[test]
-fn every_broken_variant_is_still_a_change_of_one_line_and_listed_on_the_page() {
+fn every_broken_variant_is_still_a_change_of_one_line() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let (mut caught, mut surviving) = (0, 0);
     for entry in fs::read_dir(root.join("tests/mutants")).expect("a folder") {
@@ -21,14 +19,10 @@ fn every_broken_variant_is_still_a_change_of_one_line_and_listed_on_the_page() {
         let source = fs::read_to_string(root.join(field("file:"))).expect(&name);
         assert_eq!(source.matches(&field("from:")).count(), 1, "{name}: the line to break");
         assert_ne!(field("from:"), field("to:"), "{name}");
-        let (what, test) = (field("what:"), field("test:"));
-        let test = test.split(' ').next_back().expect("a test").trim_end_matches("::");
-        let row =
-            PAGE.lines().find(|line| line.contains(&format!("`{name}`"))).unwrap_or_else(|| panic!("{name}: no row"));
-        assert!(row.contains(&what) && row.contains(test), "{name}: {row}");
+        let (_, test) = (field("what:"), field("test:"));
         let survives = text.lines().any(|line| line == "survives: yes");
         // The verdicts of a recording are in the golden table, those of a watch in the tests of its crate.
-        assert!(!survives || test == "golden" || field("test:").contains("--test watch"), "{name}: {test}");
+        assert!(!survives || test.ends_with("golden") || test.contains("--test watch"), "{name}: {test}");
         *(if survives { &mut surviving } else { &mut caught }) += 1;
     }
     assert_eq!((caught, surviving), (10, 3));
