@@ -29,7 +29,7 @@ QUADROTORS = (
     f"to 0.7 m within 5 s. Each vehicle must end within {SLOT_M:g} m of its slot. "
 )
 WORLDS = (
-    "crazyflow is built for many worlds on an accelerator; here it flies one world on one core."
+    "crazyflow is built for many worlds on an accelerator. Here it flies one world on one core."
 )
 MISSIONS = (
     "Scenes are rebuilt from the published parameters below; random ones are other draws of the same distribution. "

@@ -22,7 +22,7 @@ fn every_broken_variant_is_still_a_change_of_one_line() {
         let (_, test) = (field("what:"), field("test:"));
         let survives = text.lines().any(|line| line == "survives: yes");
         // The verdicts of a recording are in the golden table, those of a watch in the tests of its crate.
-        assert!(!survives || test.ends_with("golden") || test.contains("--test watch"), "{name}: {test}");
+        assert!(!survives || test.contains("golden") || test.contains("--test watch"), "{name}: {test}");
         *(if survives { &mut surviving } else { &mut caught }) += 1;
     }
     assert_eq!((caught, surviving), (10, 3));
