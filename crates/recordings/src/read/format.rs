@@ -11,7 +11,7 @@ pub struct FormatInfo {
     pub title: &'static str,
     /// Usual extensions. Recognition uses only the content.
     pub extensions: &'static [&'static str],
-    /// Description for `--help` and docs/recordings.md.
+    /// Description for `--help`.
     pub docs: &'static str,
     /// First bytes of every file of the format; empty without such bytes.
     pub(super) magic: &'static [&'static [u8]],
