@@ -8,6 +8,7 @@ The text below the keys of a table NAME is docs/scenario/NAME.md, if that file e
 from __future__ import annotations
 
 import json
+import re
 import sys
 import textwrap
 from pathlib import Path
@@ -22,15 +23,16 @@ HEAD = """\
 
 Which keys does a scenario have? `tautline list --show pentagon` prints a file to start from;
 [ten-minutes.md](ten-minutes.md) explains one. An editor with the JSON Schema of `tautline schema` completes and checks
-keys as you type.
-
-`tautline run`, `check`, `margin`, `sweep`, `attack` and `compare` set any key for one run: `--set time.duration_s=20`,
-`--set 'start={shape="grid", spacing_m=2}'`, `--set start.positions_m.4.x=-1`. Lists count from 1.
+keys as you type. `--set time.duration_s=20`, `--set 'start={shape="grid", spacing_m=2}'` or
+`--set start.positions_m.4.x=-1` sets a key for one run; lists count from 1.
 
 | column | meaning |
 | --- | --- |
-| type | type and range of the values; further conditions are checked and refused with a remedy |
+| type | type and range: `> 0` is a number above 0, a vector has 2 or 3 numbers. Further conditions are checked |
 | default | value without the key; `needed`: the key is required; `-`: no value, or as in the last column |
+
+Units are at the ends of keys: `_m`, `_s`, `_m_s`, `_m_s2`, `_per_s`, `_per_s2`, `_deg`, `_rad_s`, `_hz`, `_kg`, `_n`;
+others are in brackets. A row in bold begins the keys of one value, or of a subtable.
 """
 
 # Order of the tables on the page; other tables of the schema come last.
@@ -46,6 +48,8 @@ UNITS = {
     "_rad_s": "rad/s", "_m_s": "m/s", "_deg": "degrees", "_hz": "Hz", "_kg": "kg", "_m": "m", "_s": "s", "_n": "N",
 }  # fmt: skip
 UNNAMED = {"alpha": "m^2/s^2"}
+# Units that the page gives beside the key.
+BESIDE = {"m^2/s^2", "N/rpm^2", "N/rpm", "N s^2/m^2", "m^4/s^2", "s/m^2", "N s/m", "kg m^2"}
 
 COLUMNS = "| key | type | default | meaning |\n| --- | --- | --- | --- |"
 # Meanings of more words are given once in a table.
@@ -97,17 +101,44 @@ class Reference:
             for name, key in keys.items()
             if not self.is_subtable(key) and not (elsewhere and name in elsewhere[1])
         }
-        if own:
-            yield self.rows(own, table.get("required", [])) + "\n"
+        short = {name: key for name, key in keys.items() if self.is_short(f"{path}.{name}", key)}
+        rows = [self.row(name, key, name in table.get("required", [])) for name, key in own.items()]
+        if variants and not elsewhere:
+            rows += self.varied(variants)
+        for name, key in short.items():
+            rows += self.inlined(f"{path}.{name}", key)
+        if rows:
+            yield "\n".join([COLUMNS, *rows]) + "\n"
         if elsewhere:
             yield self.referred(*elsewhere, self.tag(variants[0]), bool(own))
-        elif variants:
-            yield from self.varied(variants)
         if (notes := NOTES / f"{path}.md").exists():
             yield notes.read_text(encoding="utf-8")
         for name, key in keys.items():
-            if self.is_table(key):
+            if self.is_table(key) and name not in short:
                 yield from self.section(f"{path}.{name}", key, min(level + 1, 3))
+
+    def is_short(self, path: str, key: Schema) -> bool:
+        """Returns whether the keys of a subtable are rows of the table above it: plain keys without notes."""
+        if not self.is_subtable(key) or (NOTES / f"{path}.md").exists():
+            return False
+        table = self.entries(key)
+        keys = table.get("properties", {}).values()
+        return bool(keys) and not self.variants(table) and not any(map(self.is_table, keys))
+
+    def inlined(self, path: str, key: Schema) -> list[str]:
+        """Returns the rows of a subtable."""
+        table = self.entries(key)
+        several = self.followed(key).get("type") == "array"
+        about = cell(max(key.get("description", ""), table.get("description", ""), key=len))
+        rows = [f"| **`{self.heading(path, several).strip('`')}`** | | | {about} |"]
+        needed = table.get("required", [])
+        return rows + [self.row(name, one, name in needed) for name, one in table["properties"].items()]
+
+    def entries(self, key: Schema) -> Schema:
+        """Returns the table of a key, or that of each entry of a list."""
+        table = self.followed(key)
+        table = self.followed(table["items"]) if table.get("type") == "array" else table
+        return self.one_of_several(table)[0]
 
     @staticmethod
     def referred(section: str, common: list[str], tag: str, has_own: bool) -> str:
@@ -116,15 +147,14 @@ class Reference:
         also = "Also " if has_own else ""
         return f"{also}{names} with the keys of that value, as in [`[{section}]`](#{section}).\n"
 
-    def varied(self, variants: list[Schema]) -> Iterator[str]:
-        """Yields the keys that depend on the value of another key."""
+    def varied(self, variants: list[Schema]) -> list[str]:
+        """Returns the rows of keys that depend on the value of another key."""
         tag = self.tag(variants[0])
-        names = [variant["properties"][tag]["const"] for variant in variants]
-        yield f"`{tag}` is {alternatives(names)}. Each value has the keys below it.\n"
-        rows = [COLUMNS]
+        rows = []
         first: dict[str, str] = {}
-        for name, variant in zip(names, variants):
-            default = "" if tag in variant.get("required", []) else f" This is the default."
+        for variant in variants:
+            name = variant["properties"][tag]["const"]
+            default = "" if tag in variant.get("required", []) else " This is the default."
             rows.append(f"| **`{tag} = \"{name}\"`** | | | {cell(variant['description'])}{default} |")
             own = {key: value for key, value in variant["properties"].items() if key != tag}
             for key, value in own.items():
@@ -132,7 +162,7 @@ class Reference:
                 there = first.setdefault(row, name)
                 is_repeated = there != name and len(row.rsplit(" | ", 1)[1].split()) > LONG
                 rows.append(f"| `{key}` | | | as under `{there}` |" if is_repeated else row)
-        yield "\n".join(rows) + "\n"
+        return rows
 
     def rows(self, keys: dict[str, Schema], required: list[str]) -> str:
         return "\n".join([COLUMNS, *(self.row(name, key, name in required) for name, key in keys.items())])
@@ -144,8 +174,10 @@ class Reference:
         words += [f"`{one['const']}`: {cell(one['description'])}" for one in self.words(kind)]
         range_ = "" if self.words(kind) else self.range_of(kind)
         type_ = ", ".join(part for part in (self.type_of(key), range_) if part)
-        if (said := unit(name)) and f" in {said}" not in words[0]:
-            type_ += f" \\[{said}\\]"
+        type_ = type_.removeprefix("number, ")
+        if said := unit(name):
+            type_ += f" \\[{said}\\]" if said in BESIDE else ""
+            words[0] = re.sub(rf",? in {re.escape(said)}(?= |[,.:;]|$)", "", words[0], count=1)
         return f"| `{name}` | {type_} | {default} | {'<br>'.join(words)} |"
 
     def type_of(self, key: Schema) -> str:
@@ -158,9 +190,11 @@ class Reference:
             return "word"
         if kind["type"] == "array":
             few = kind.get("minItems"), kind.get("maxItems")
+            if few == (2, 3):
+                return "vector"
             count = "" if few == (None, None) else f"{few[0]} " if few[0] == few[1] else f"{few[0]} to {few[1]} "
             return f"list of {count}{plural(self.type_of(kind['items']))}"
-        names = {"number": "number", "integer": "whole number", "boolean": "`true` or `false`", "string": "text"}
+        names = {"number": "number", "integer": "integer", "boolean": "boolean", "string": "text"}
         return names[kind["type"]]
 
     def range_of(self, kind: Schema) -> str:
@@ -236,8 +270,8 @@ def unit(name: str) -> str:
 
 
 def plural(said: str) -> str:
-    many = {"number": "numbers", "whole number": "whole numbers", "table": "tables", "word": "words", "text": "texts"}
-    return many.get(said, said.replace("list", "lists", 1))
+    many = ("number", "integer", "vector", "table", "word", "text")
+    return f"{said}s" if said in many else said.replace("list", "lists", 1)
 
 
 def alternatives(names: list[str], quoted: bool = True) -> str:
