@@ -48,7 +48,7 @@ impl Validation {
             page.extend(["\n## ", group.title, "\n\n", HEAD]);
             page.extend(group.claims.iter().map(entry));
         }
-        page + "\n## Convergence ladder\n\n" + &self.convergence_table()
+        page
     }
 
     fn errata(&self) -> String {
@@ -63,18 +63,6 @@ impl Validation {
             format!("| {finding} | {} ({source}) | {} | `{id}` |\n", cell(statement), cell(expected))
         }));
         table
-    }
-
-    fn convergence_table(&self) -> String {
-        let head = "Largest position error in the pentagon flight against continuous time, at 10 samples a second for \
-                    10 s.\n\n| step [s] | position error [m] | order | energy excess [m^2/s^2] |\n\
-                    | --- | --- | --- | --- |\n";
-        let rows = self.convergence.iter().map(|Refinement { dt_s, error_m, order, energy_excess_m2_s2, .. }| {
-            let order = order.map_or("-".to_owned(), |order| format!("{order:.2}"));
-            let hz = 1.0 / dt_s;
-            format!("| 1/{hz:.0} | {error_m:.1e} | {order} | {energy_excess_m2_s2:.1e} |\n")
-        });
-        std::iter::once(head.to_owned()).chain(rows).collect()
     }
 }
 
