@@ -51,4 +51,5 @@ LONG = {
 # Built programs that run in place of cargo.
 INSTEAD = {
     "cargo run --release --example own_law": "debug/examples/own_law",
+    "cargo run --release --package example-shield": "debug/example-shield",
 }
