@@ -53,7 +53,7 @@ BESIDE = {"m^2/s^2", "N/rpm^2", "N/rpm", "N s^2/m^2", "m^4/s^2", "s/m^2", "N s/m
 
 COLUMNS = "| key | type | default | meaning |\n| --- | --- | --- | --- |"
 # Meanings of more words are given once in a table.
-LONG = 8
+LONG = 4
 
 
 class Reference:
@@ -157,11 +157,15 @@ class Reference:
             default = "" if tag in variant.get("required", []) else " This is the default."
             rows.append(f"| **`{tag} = \"{name}\"`** | | | {cell(variant['description'])}{default} |")
             own = {key: value for key, value in variant["properties"].items() if key != tag}
+            repeated: dict[str, list[str]] = {}
             for key, value in own.items():
                 row = self.row(key, value, key in variant.get("required", []))
                 there = first.setdefault(row, name)
-                is_repeated = there != name and len(row.rsplit(" | ", 1)[1].split()) > LONG
-                rows.append(f"| `{key}` | | | as under `{there}` |" if is_repeated else row)
+                if there != name and len(row.rsplit(" | ", 1)[1].split()) > LONG:
+                    repeated.setdefault(there, []).append(f"`{key}`")
+                else:
+                    rows.append(row)
+            rows += [f"| {', '.join(keys)} | | | as under `{there}` |" for there, keys in repeated.items()]
         return rows
 
     def rows(self, keys: dict[str, Schema], required: list[str]) -> str:
