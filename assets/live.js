@@ -14,7 +14,9 @@ const part = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.
 const [band, icon, word, verdict, brake, sound, absent, pairs, facts, log] =
   ["band", "icon", "word", "verdict", "brake", "sound", "absent", "pairs", "facts", "log"].map(part);
 const ICONS = { clear: "\u2713", warning: "\u26a0", undecided: "?", violation: "\u2716" };
-const start = root.querySelector(".replay-start").onclick;
+// The first vehicle starts the view: there is nothing to start before.
+const button = root.querySelector(".replay-start"), start = button.onclick;
+button.remove();
 /** Data of a view without vehicles. */
 const empty = JSON.parse(root.querySelector("script").textContent);
 /** @type {string[]} */
@@ -199,7 +201,8 @@ const list = frame => {
     if (nominal < delta) row.className = "reasons";
     return row;
   }));
-  fill(facts, [`delta ${delta} m`, ...frame.facts ?? []]);
+  // The roster of the first vehicle names delta.
+  fill(facts, [...names.length ? [`delta ${delta} m`] : [], ...frame.facts ?? []]);
   const { heard, stale, signed_off: off } = frame.state, shown = drawn.filter((_, k) => k % 4 === 3 && drawn[k]).length;
   const named = (/** @type {string} */ what, /** @type {string[]} */ of) =>
     of.length ? ` ${what}: ${of.join(", ")}.` : "";
