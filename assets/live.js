@@ -5,6 +5,8 @@
 (() => {
 // Instants that are drawn, and the time between two [s].
 const INSTANTS = 200, PERIOD_S = 0.1;
+// Corners of a box. ROOM is the half size of the box of the view over the extent of the vehicles and their trails.
+const CORNERS = 8, ROOM = 0.65;
 // Delay from which the shown state is not known [s], and largest relative rate of the clocks of server and browser.
 const MOST_BEHIND_S = 1, DRIFT = 1e-4;
 const root = /** @type {any} */ (document.querySelector(".replay"));
@@ -12,7 +14,9 @@ const part = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.
 const [band, icon, word, verdict, brake, sound, absent, pairs, facts, log] =
   ["band", "icon", "word", "verdict", "brake", "sound", "absent", "pairs", "facts", "log"].map(part);
 const ICONS = { clear: "\u2713", warning: "\u26a0", undecided: "?", violation: "\u2716" };
-const start = root.querySelector(".replay-start").onclick;
+// The first vehicle starts the view: there is nothing to start before.
+const button = root.querySelector(".replay-start"), start = button.onclick;
+button.remove();
 /** Data of a view without vehicles. */
 const empty = JSON.parse(root.querySelector("script").textContent);
 /** @type {string[]} */
@@ -46,27 +50,55 @@ const packed = numbers => {
 const placed = places => places.flatMap(at =>
   at ? [...[0, 1, 2].map(axis => at[axis] - (box?.[0][axis] ?? 0)), at[3] ? 1 : 0] : [0, 0, 0, 0]);
 
-/** Starts the view around the last positions, with the trails behind them. */
+/**
+ * Returns instants in which the vehicles are at the corners of the box. The camera fits all instants, and thus the box.
+ * @param {number[]} half
+ */
+const corners = half => Array.from({ length: CORNERS }, (_, k) => names.flatMap((_, vehicle) => {
+  const corner = vehicle + k;
+  // A visit of its own keeps an instant out of the trails.
+  return [...half.map((size, axis) => corner >> axis & 1 ? size : -size), k + 2];
+}));
+
+/** Controls of the view: choices and layers. @returns {any[]} */
+const controls = () => [...root.querySelectorAll(".replay-buttons :is(select, input)")];
+
+/** Starts the view with a box around the last positions and their trails. Keeps the choices of the old view. */
 const restart = () => {
-  const there = past.at(-1)?.filter(at => at) ?? [];
-  const ends = [0, 1, 2].map(axis => {
-    const all = there.map(at => at?.[axis] ?? 0);
-    return [Math.min(...all), Math.max(...all)];
+  const ends = [0, 1, 2].map(() => [Infinity, -Infinity]);
+  for (const at of past.flat()) if (at) ends.forEach((end, axis) => {
+    end[0] = Math.min(end[0], at[axis]);
+    end[1] = Math.max(end[1], at[axis]);
   });
+  for (const end of ends) if (end[0] > end[1]) end.fill(0);
   const middle = ends.map(([low, high]) => (low + high) / 2);
-  const half = ends.map(([low, high]) => Math.max(high - low, 4 * delta, 1));
+  const half = ends.map(([low, high]) => Math.max(ROOM * (high - low), 2 * delta, 1));
   box = [middle, half];
   const reach = Math.max(half[0], half[1]), square = 10 ** Math.round(Math.log10(reach / 5));
   const most = Math.ceil(reach / square) * square, low = Math.min(0, ends[2][0]) - middle[2];
   const times = Float64Array.from({ length: INSTANTS }, (_, k) => (k + 1 - INSTANTS) * PERIOD_S);
   const first = Float64Array.of(times[0]), nobody = Uint16Array.of(65535, 65535);
+  const trails = past.slice(CORNERS - INSTANTS).map(placed), absent = placed(names.map(() => null));
+  const free = Array.from({ length: INSTANTS - CORNERS - trails.length }, () => absent);
   root.querySelector("script").textContent = JSON.stringify({
     ...empty, vehicles: names, radius_m: names.map(() => radius), shell_m: [delta / 2, delta / 2, delta / 2],
     delta_m: delta, times_s: packed(times), points: names.length, starts: packed(new Int32Array(3 * names.length)),
-    places: past.map(placed), cell_m: 1, origin_m: middle, middle_m: middle, half_m: half, square_m: square,
-    ground: [[-most, -most, low], [most, most, low]], near_s: packed(first), near_who: packed(nobody),
+    places: [...corners(half), ...free, ...trails], cell_m: 1, origin_m: middle, middle_m: middle, half_m: half,
+    square_m: square, ground: [[-most, -most, low], [most, most, low]], near_s: packed(first), near_who: packed(nobody),
   });
+  const old = controls(), hasFocus = document.activeElement?.matches(".replay-view");
+  // The start of a replay moves the focus into the view, and thus scrolls the page. An inert view takes no focus.
+  root.inert = true;
   start();
+  root.inert = false;
+  if (hasFocus) root.querySelector("canvas")?.focus({ preventScroll: true });
+  controls().forEach((control, k) => {
+    const name = control.ariaLabel;
+    // The camera has a new position, and no vehicle is picked.
+    if (!old[k] || name === "Speed" || (name === "Camera" && old[k].value !== "swarm")) return;
+    [control.value, control.checked] = [old[k].value, old[k].checked];
+    control.onchange();
+  });
   // A live view has no other time to play or to choose.
   for (const one of root.querySelectorAll(".replay-play, .replay-track, .replay-clock, [aria-label=Speed]"))
     one.style.display = "none";
@@ -126,9 +158,8 @@ const show = (said, status, { violated = [], warning = "", brake: by = "", name 
   verdict.textContent = said;
   brake.textContent = by;
   document.title = `${icon.textContent} ${by || text} - tautline watch`;
-  // Without a box the view has other vehicles than the roster.
-  const inView = `${text}: ${said}`;
-  if (box) root.player?.push(drawn, [-INSTANTS * PERIOD_S, next === "violation", inView, violated, null], near);
+  // Without a box the view has other vehicles than the roster. The sentence is in the band: it would cover the view.
+  if (box) root.player?.push(drawn, [-INSTANTS * PERIOD_S, next === "violation", text, violated, null], near);
 };
 /** Shows that the state is old. @param {number} behind_s */
 const doubt = behind_s => show(`the page is ${behind_s.toFixed(1)} s behind`, "undecided");
@@ -170,7 +201,8 @@ const list = frame => {
     if (nominal < delta) row.className = "reasons";
     return row;
   }));
-  fill(facts, [`delta ${delta} m`, ...frame.facts ?? []]);
+  // The roster of the first vehicle names delta.
+  fill(facts, [...names.length ? [`delta ${delta} m`] : [], ...frame.facts ?? []]);
   const { heard, stale, signed_off: off } = frame.state, shown = drawn.filter((_, k) => k % 4 === 3 && drawn[k]).length;
   const named = (/** @type {string} */ what, /** @type {string[]} */ of) =>
     of.length ? ` ${what}: ${of.join(", ")}.` : "";
@@ -184,9 +216,11 @@ const draw = frame => {
   hasEnded = false;
   const behind_s = delay(frame.sent_s), isOld = behind_s > MOST_BEHIND_S;
   const places = frame.places.slice(0, names.length);
-  past = [...past, places.map((/** @type {any} */ at) => at?.[3] ? at : null)].slice(-INSTANTS);
-  const outside = places.some((/** @type {any} */ at) =>
-    at && (!root.player || !box || [0, 1, 2].some(axis => Math.abs(at[axis] - box[0][axis]) > box[1][axis])));
+  const present = places.map((/** @type {any} */ at) => at?.[3] ? at : null);
+  past = [...past, present].slice(-INSTANTS);
+  const [middle, half] = box ?? [[0, 0, 0], [-1, -1, -1]];
+  const outside = present.some((/** @type {any} */ at) =>
+    at && half.some((size, axis) => Math.abs(at[axis] - middle[axis]) > size));
   if (outside) restart();
   drawn = placed(places);
   near = frame.near ?? [65535, 65535];
