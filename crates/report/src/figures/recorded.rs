@@ -126,6 +126,10 @@ fn steps(bounds: &[LowerBound]) -> Vec<(f64, f64)> {
     points
 }
 
+/// Smallest distance seen from above, as a share of the width of the paths, that an inset enlarges. Below, as when one
+/// vehicle passes over the other, the direction between the two is rounding.
+const LEAST_SHARE: f64 = 1e-4;
+
 /// Draws the paths of two vehicles from above \[m\] and their positions at the closest approach. An inset enlarges that
 /// approach; it is four times the distance wide.
 #[must_use]
@@ -146,7 +150,10 @@ pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
         chart.line(vec![one, other], Stroke::dashed(INK, 1.4), format!("closest {closest}"));
         let middle = (f64::midpoint(one.0, other.0), f64::midpoint(one.1, other.1));
         let apart = (one.0 - other.0).hypot(one.1 - other.1);
-        chart.inset = Some(Inset { middle, half: 0.5 * NEAR * apart });
+        let spans = [extent(points().map(|point| point.0)), extent(points().map(|point| point.1))];
+        let width = spans.into_iter().flatten().map(|(from, to)| to - from).fold(0.0, f64::max);
+        let inset = Inset { middle, half: 0.5 * NEAR * apart };
+        chart.inset = (apart > LEAST_SHARE * width).then_some(inset);
     }
     let [first, second] = &encounter.names;
     let description = format!("Paths of {first} and {second} from above; rings where they are closest, {closest}.");
@@ -190,6 +197,7 @@ pub fn plan_distances(lines: &[PlanLine<'_>], tube_m: Option<f64>, title: &str) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::figures::Format;
 
     fn encounter(slack_m: f64) -> Encounter {
         let times = (0..=20).map(|k| 0.1 * f64::from(k));
@@ -212,6 +220,22 @@ mod tests {
         assert!(doubtful.svg.matches("<polygon").count() > sure.svg.matches("<polygon").count());
         let seen = closest_approach(&encounter(0.0), "Closest approach");
         assert!(seen.svg.contains("alpha") && seen.svg.contains("closest 1.000000 m at 1.000 s"));
+    }
+
+    #[test]
+    fn a_vertical_approach_has_no_inset_and_becomes_a_picture() {
+        let above = |aside_m: f64| {
+            let mut seen = encounter(0.0);
+            // The paths cross at right angles, with this distance from above.
+            seen.paths_m[1] = (0..=20).map(|k| (5.0 + aside_m, 0.5 * f64::from(k) - 5.0)).collect();
+            closest_approach(&seen, "Closest approach")
+        };
+        let frames = |figure: &Figure| figure.svg.matches("<svg x=").count();
+        for (aside_m, insets) in [(1e-15, 0), (0.0, 0), (1.1e-3, 1), (0.5, 1)] {
+            let figure = above(aside_m);
+            assert_eq!(frames(&figure), insets, "{aside_m}: {}", figure.svg);
+            assert!(figure.file(Format::Png).starts_with(b"\x89PNG"));
+        }
     }
 
     #[test]
