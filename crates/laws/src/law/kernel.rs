@@ -14,7 +14,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::iter::{IndexedParallelIterator as _, IntoParallelRefMutIterator as _, ParallelIterator as _};
 
-use self::block::{Block, Ends, LANES, PADDING_M, add_lanes, total};
+use self::block::{Block, Ends, LANES, PADDING_M, add_pulls, total};
 use super::tension::OutOfDomain;
 use crate::graph::Graph;
 use tautline_core::swarm::{Rows, columns, columns_mut};
@@ -28,7 +28,7 @@ const BANDED_FROM: usize = 640;
 /// Number of bands, and the largest number of threads with work. All bands have about the same number of edges.
 const BANDS: usize = 16;
 /// Edges per block of a row: large enough to change stages seldom, small enough for the processor's first-level cache.
-const ROW_BLOCK: usize = 8 * LANES;
+const ROW_BLOCK: usize = 16 * LANES;
 /// Edges per block of a list: small, because lists are often short and each block is cleared first.
 const LIST_BLOCK: usize = 2 * LANES;
 
@@ -112,7 +112,7 @@ impl WithSimd for AddRows<'_> {
     type Output = Result<f64, OutOfDomain>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let Self { kernel, count, rows, axes: [x, y, z], sums: [of_x, of_y, of_z] } = self;
         let mut block = Block::<ROW_BLOCK>::new(kernel.delta_m);
         let start = rows.start;
@@ -124,16 +124,16 @@ impl WithSimd for AddRows<'_> {
             while j < count {
                 let edges = ROW_BLOCK.min(count - j);
                 let lanes = edges.next_multiple_of(LANES);
-                let (from, to) = (j - start, j - start + lanes);
                 let ends = Ends {
                     count: edges,
                     inverse_k_per_m: &kernel.inverse_k_per_m[edge..edge + lanes],
                     positions_m: [&x[j..j + lanes], &y[j..j + lanes], &z[j..j + lanes]],
-                    sums: [&mut of_x[from..to], &mut of_y[from..to], &mut of_z[from..to]],
                 };
-                let pulls = block.pull(own, ends);
-                for axis in 0..3 {
-                    add_lanes(&mut of_own[axis], pulls[axis]);
+                let weights = block.weights(own, &ends);
+                let (from, to) = (j - start, j - start + lanes);
+                let sums = [&mut of_x[from..to], &mut of_y[from..to], &mut of_z[from..to]];
+                for (axis, sums) in sums.into_iter().enumerate() {
+                    add_pulls(simd, own[axis], ends.positions_m[axis], weights, sums, &mut of_own[axis]);
                 }
                 edge += edges;
                 j += edges;
@@ -164,25 +164,24 @@ impl WithSimd for AddList<'_> {
         while first < kernel.list.len() {
             let list = &kernel.list[first..kernel.list.len().min(first + LIST_BLOCK)];
             // Each edge begins at the origin and ends at the position of its second vehicle relative to its first.
-            let (mut ends_m, mut of_ends) = ([[PADDING_M; LIST_BLOCK]; 3], [[0.0; LIST_BLOCK]; 3]);
+            let mut ends_m = [[PADDING_M; LIST_BLOCK]; 3];
             for axis in 0..3 {
                 for k in 0..list.len() {
                     ends_m[axis][k] = axes[axis][list[k][1]] - axes[axis][list[k][0]];
                 }
             }
             let lanes = list.len().next_multiple_of(LANES);
-            let ([x, y, z], [of_x, of_y, of_z]) = (&ends_m, &mut of_ends);
             let ends = Ends {
                 count: list.len(),
                 inverse_k_per_m: &kernel.inverse_k_per_m[first..first + lanes],
-                positions_m: [&x[..lanes], &y[..lanes], &z[..lanes]],
-                sums: [&mut of_x[..lanes], &mut of_y[..lanes], &mut of_z[..lanes]],
+                positions_m: ends_m.each_ref().map(|axis| &axis[..lanes]),
             };
-            let pulls = block.pull([0.0; 3], ends);
+            let weights = block.weights([0.0; 3], &ends);
             for axis in 0..3 {
                 for k in 0..list.len() {
-                    sums[axis][list[k][0]] += pulls[axis][k];
-                    sums[axis][list[k][1]] -= pulls[axis][k];
+                    let pull = (0.0 - ends_m[axis][k]) * weights[k];
+                    sums[axis][list[k][0]] += pull;
+                    sums[axis][list[k][1]] -= pull;
                 }
             }
             first += list.len();

@@ -274,9 +274,17 @@ fn is_near_barrier(s: f64) -> bool {
 /// Returns e^x - 1 for x <= 1, to two units in the last place.
 ///
 /// Consists of additions and multiplications without branches. The compiler can vectorise it for any width, and its
-/// bits are the same on every machine.
+/// bits are the same on every machine. The kernel calls the three parts in separate loops, so that the constants of
+/// each loop fit the vector registers.
 #[inline(always)]
-pub(super) fn expm1(x: f64) -> f64 {
+fn expm1(x: f64) -> f64 {
+    let (r, power) = reduce(x);
+    scale(power, expm1_reduced(r))
+}
+
+/// Returns r and a power of 2 with `e^x = power e^r` and |r| <= ln(2)/2.
+#[inline(always)]
+pub(super) fn reduce(x: f64) -> (f64, f64) {
     /// Adding this constant to a small number rounds it to an integer, held in the lowest bits of the sum.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// ln 2 in two parts; products of the first with integers of up to 11 bits are exact.
@@ -289,18 +297,26 @@ pub(super) fn expm1(x: f64) -> f64 {
     let rounded = x * std::f64::consts::LOG2_E + ROUND;
     let exponent = rounded - ROUND;
     let r = (x - exponent * LN_2_HIGH) - exponent * LN_2_LOW;
-    let power = f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52);
+    (r, f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52))
+}
 
-    // e^r - 1 = r + r^2 (c2 + c3 r + ... + c13 r^11), |r| <= ln(2)/2, cn = 1/n!. The truncation error is below 2e-17
-    // of the sum.
+/// Returns e^r - 1 for |r| <= ln(2)/2.
+#[inline(always)]
+pub(super) fn expm1_reduced(r: f64) -> f64 {
+    // e^r - 1 = r + r^2 (c2 + c3 r + ... + c13 r^11), cn = 1/n!. The truncation error is below 2e-17 of the sum.
     let r2 = r * r;
     let r4 = r2 * r2;
     let r8 = r4 * r4;
     let c2_5 = (C[0] + C[1] * r) + (C[2] + C[3] * r) * r2;
     let c6_9 = (C[4] + C[5] * r) + (C[6] + C[7] * r) * r2;
     let c10_13 = (C[8] + C[9] * r) + (C[10] + C[11] * r) * r2;
-    let fraction = r + r2 * (c2_5 + c6_9 * r4 + c10_13 * r8);
-    (power - 1.0) + power * fraction
+    r + r2 * (c2_5 + c6_9 * r4 + c10_13 * r8)
+}
+
+/// Returns `power e^r - 1`, given `e^r - 1`.
+#[inline(always)]
+pub(super) fn scale(power: f64, expm1_reduced: f64) -> f64 {
+    (power - 1.0) + power * expm1_reduced
 }
 
 /// 1/n! for n from 2 to 13.
