@@ -134,6 +134,10 @@ coded! {
         SettingsFile = "settings-file",
         /// The announced starts of a pair, equal on both sides.
         SharedStarts = "shared-starts",
+        /// No earlier flight from the same starts had the number of this flight.
+        FlightNumber = "flight-number",
+        /// A vehicle that returns has saved its contracts before each message and command.
+        SavedContracts = "saved-contracts",
         /// Commands up to a bound are carried out.
         Acceleration = "acceleration",
         /// Bound on pushes.

@@ -185,6 +185,13 @@ impl Assumption {
         let fact = Fact::number(FactKind::SharedStarts, source, starts.agreed as f64, "vehicles");
         Self { fact, share: None, held }
     }
+
+    /// Assumption that no message shows. It holds where one program computes all shields: there are no messages of an
+    /// earlier flight, and no vehicle returns alone.
+    pub(crate) fn of_one_program(kind: FactKind, starts: SharedStarts) -> Self {
+        let source = if starts.is_one_list { Source::Proved } else { Source::NotObservable };
+        Self { fact: Fact::new(kind, source), share: None, held: starts.is_one_list.then_some(true) }
+    }
 }
 
 /// Returns the assumptions of a certificate in the order of the theorem.
@@ -198,6 +205,8 @@ pub(crate) fn assumptions(limits: &Limits, counters: &Counters, starts: SharedSt
     let push = Fact::number(FactKind::Disturbance, Source::NotObservable, settings.disturbance_m_s2, "m/s^2");
     vec![
         Assumption::shared_starts(counters, starts),
+        Assumption::of_one_program(FactKind::FlightNumber, starts),
+        Assumption::of_one_program(FactKind::SavedContracts, starts),
         Assumption {
             share: counters.command_share,
             held: is_above(counters.command_share).then_some(false),
@@ -425,6 +434,8 @@ mod tests {
             found(&counters, starts),
             [
                 ("shared-starts", "declared", None),
+                ("flight-number", "not-observable", None),
+                ("saved-contracts", "not-observable", None),
                 ("acceleration", "declared", None),
                 ("disturbance", "not-observable", None),
                 ("position-error", "not-observable", None),
@@ -441,7 +452,7 @@ mod tests {
         let seen = found(&counters, agreed);
         assert_eq!(seen[0], ("shared-starts", "exchanged", Some(true)));
         assert_eq!(
-            seen[3..6],
+            seen[5..8],
             [
                 ("position-error", "observed", Some(false)),
                 ("velocity-error", "observed", Some(true)),
@@ -453,9 +464,12 @@ mod tests {
         counters.commanded(6.0, 5.0);
         counters.heard(Heard::OtherStarts, 1);
         let seen = found(&counters, agreed);
-        let refuted = [seen[0].2, seen[1].2, seen[5].2];
+        let refuted = [seen[0].2, seen[3].2, seen[7].2];
         assert_eq!(refuted, [Some(false); 3]);
         let one = found(&Counters::default(), SharedStarts { is_one_list: true, ..starts });
-        assert_eq!(one[0], ("shared-starts", "proved", Some(true)));
+        assert_eq!(
+            one[..3],
+            ["shared-starts", "flight-number", "saved-contracts"].map(|kind| (kind, "proved", Some(true)))
+        );
     }
 }

@@ -507,9 +507,11 @@ impl UnicycleShield {
     /// held.
     #[must_use]
     pub fn assumptions(&self) -> Vec<Assumption> {
-        let (loiter, counters) = (&self.loiter, &self.counters);
+        let (loiter, counters, starts) = (&self.loiter, &self.counters, self.shared_starts());
         vec![
-            Assumption::shared_starts(counters, self.shared_starts()),
+            Assumption::shared_starts(counters, starts),
+            Assumption::of_one_program(FactKind::FlightNumber, starts),
+            Assumption::of_one_program(FactKind::SavedContracts, starts),
             Assumption::declared(FactKind::Acceleration, loiter.accel_m_s2, "m/s^2"),
             Assumption::observed(
                 FactKind::TrackingError,
