@@ -21,7 +21,7 @@ const COUNT: usize = 100;
 fn lattice(physics_hz: f64) -> Scenario {
     let start = Swarm::at_rest(Formation::grid(COUNT, 0.8).slots_m);
     let mut scenario = Scenario::new("lattice", start, Formation::grid(COUNT, 0.7), 0.4, 1.0);
-    let model = vehicle::read(MODELS[0].1).expect("a model");
+    let model = vehicle::read(MODELS[0].0, MODELS[0].1).expect("a model");
     let quadrotor = Quadrotor { model, attitude_hz: DEFAULT_ATTITUDE_HZ, ground_effect: false, downwash: false };
     scenario.set_airframe(Airframe::Quadrotor(Box::new(quadrotor)));
     scenario.law = LawSpec::EdgeTension(EdgeTensionKeys { alpha: 1e-4 });

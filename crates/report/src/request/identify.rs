@@ -44,7 +44,8 @@ pub fn identify(what: &ScenarioRequest, out: Option<&Path>) -> Result<Identified
 /// Returns the text of a model: that of the file if it holds the model, of the built-in model, or of its keys.
 fn model_text(path: &Path, model: &Model) -> Result<String, Failure> {
     let is_same = |text: &str| {
-        vehicle::read(text).is_ok_and(|other| Model { tracking: model.tracking.clone(), ..other } == *model)
+        vehicle::read(&model.name, text)
+            .is_ok_and(|other| Model { tracking: model.tracking.clone(), ..other } == *model)
     };
     match std::fs::read_to_string(path) {
         Ok(text) if is_same(&text) => return Ok(text),

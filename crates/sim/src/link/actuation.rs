@@ -34,7 +34,7 @@ impl ImperfectionSpec for ActuationSpec {
         }
         let problem = "the ideal plant supports no lag";
         let help = "leave out actuation.lag_s, or set plant.kind to \"rapier\"";
-        Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help).at_keys(["actuation.lag_s", "plant.kind"]))
+        Err(ErrorKind::UnsupportedByPlant.at(&["actuation.lag_s", "plant.kind"], problem, help))
     }
 
     fn voids(&self) -> Vec<VoidReason> {

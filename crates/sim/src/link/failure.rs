@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ImperfectionSpec;
 use super::sensing::SAME_S;
-use crate::scenario::{ErrorKind, Scenario, ScenarioError};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError, entry_key};
 use crate::vehicle::RotorFailure;
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::law::VoidReason;
@@ -73,15 +73,17 @@ impl ImperfectionSpec for Vec<Failure> {
             if vehicle == 0 || failure.index() >= scenario.count() {
                 let problem = format!("the vehicle must be from 1 to {}, got {vehicle}", scenario.count());
                 let help = "vehicles are counted from 1";
-                return Err(ScenarioError::new(ErrorKind::UnknownVehicle, problem, help).at_entry("failure", entry));
+                return Err(ErrorKind::UnknownVehicle.at(&[&entry_key("failure", entry)], problem, help));
             }
             if !(0.0..scenario.time.duration_s).contains(&at_s) {
                 let problem =
                     format!("at_s must be from 0 s to less than {} s, got {at_s} s", scenario.time.duration_s);
                 let help = "give a time within the flight";
-                return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
-                    .at_entry("failure", entry)
-                    .at("time.duration_s"));
+                return Err(ErrorKind::OutsideFlight.at(
+                    &[&entry_key("failure", entry), "time.duration_s"],
+                    problem,
+                    help,
+                ));
             }
             match kind {
                 FailureKind::Dead {} => {}
@@ -117,7 +119,7 @@ impl Scenario {
         } else {
             return Ok(());
         };
-        Err(ScenarioError::new(kind, said, help).at_entry("failure", entry))
+        Err(kind.at(&[&entry_key("failure", entry)], said, help))
     }
 
     fn check_frozen(&self, entry: usize) -> Result<(), ScenarioError> {
@@ -126,9 +128,7 @@ impl Scenario {
         }
         let problem = "vehicles of the ideal plant hold no command in continuous time";
         let help = "set time.control_hz, or plant.kind to \"rapier\"";
-        Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help)
-            .at_entry("failure", entry)
-            .at("plant.kind"))
+        Err(ErrorKind::UnsupportedByPlant.at(&[&entry_key("failure", entry), "plant.kind"], problem, help))
     }
 
     fn check_silent(&self, entry: usize) -> Result<(), ScenarioError> {
@@ -137,7 +137,7 @@ impl Scenario {
         }
         let problem = "a vehicle cannot fall silent without a rate of messages";
         let help = "set network.rate_hz, such as 50";
-        Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at_entry("failure", entry))
+        Err(ErrorKind::MissingKey.at(&[&entry_key("failure", entry)], problem, help))
     }
 
     /// Returns the failures of rotors.

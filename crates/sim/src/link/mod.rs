@@ -84,7 +84,7 @@ impl Scenario {
         }
         let problem = format!("{key} samples the state, but the ideal plant evaluates the law in continuous time");
         let help = "set time.control_hz, the rate of held commands, or set plant.kind to \"rapier\"";
-        Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help).at_keys([key, "plant.kind"]))
+        Err(ErrorKind::UnsupportedByPlant.at(&[key, "plant.kind"], problem, help))
     }
 }
 
@@ -204,7 +204,7 @@ fn latency(key: &'static str, what: &str, latency_s: f64, duration_s: f64) -> Re
             "reduce the latency, or increase time.duration_s",
         )
     };
-    Err(ScenarioError::new(kind, said, help).at(key).at("time.duration_s"))
+    Err(kind.at(&[key, "time.duration_s"], said, help))
 }
 
 /// Solver steps of continuous time within the shortest delay, so that the past is interpolated finely enough.

@@ -8,7 +8,7 @@ use super::history::History;
 use super::messages::Messages;
 use super::sensing::StateSensor;
 use super::{ImperfectionSpec, Traffic, latency};
-use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, is_default};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, entry_key, is_default};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::VoidReason;
@@ -160,14 +160,12 @@ impl Scenario {
             return Ok(());
         }
         let problem = format!("{key} needs a rate of messages");
-        Err(ScenarioError::new(ErrorKind::MissingKey, problem, "set network.rate_hz, such as 50").at(key))
+        Err(ErrorKind::MissingKey.at(&[key], problem, "set network.rate_hz, such as 50"))
     }
 
     fn check_link(&self, entry: usize, failure: &LinkFailure) -> Result<(), ScenarioError> {
         let &LinkFailure { link: [a, b], from_s, to_s } = failure;
-        let refuse = |kind, said: String, help: &str| {
-            Err(ScenarioError::new(kind, said, help).at_entry("network.failure", entry))
-        };
+        let refuse = |kind: ErrorKind, said: String, help: &str| Err(kind.at(&[&entry_key("network.failure", entry)], said, help));
         let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
         let is_link = match (index(a), index(b)) {
             (Some(i), Some(j)) if i != j && i.max(j) < self.count() => {
@@ -204,8 +202,7 @@ impl Scenario {
                 self.time.dt_s
             );
             let help = format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s);
-            return Err(ScenarioError::new(ErrorKind::StepTooLong, problem, help)
-                .at_keys(["network.rate_hz", "sensing.rate_hz"]));
+            return Err(ErrorKind::StepTooLong.at(&["network.rate_hz", "sensing.rate_hz"], problem, help));
         }
         let count = self.count() as u128;
         let pairs = count * count.saturating_sub(1);
@@ -223,7 +220,7 @@ impl Scenario {
             bytes >> 30
         );
         let help = "choose a graph of fewer edges, such as [graph] kind = \"ring\", or send less often";
-        Err(ScenarioError::new(ErrorKind::Memory, problem, help).at_keys(["network.rate_hz", "graph.kind"]))
+        Err(ErrorKind::Memory.at(&["network.rate_hz", "graph.kind"], problem, help))
     }
 }
 
@@ -237,7 +234,7 @@ fn check_loss(loss: f64, burst: Option<f64>) -> Result<(), ScenarioError> {
     }
     let problem = format!("bursts of {burst} lost messages in the mean cannot lose a share of {loss}");
     let help = format!("give at least {least}, or leave network.loss_burst out for independent losses");
-    Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help).at_keys(["network.loss_burst", "network.loss"]))
+    Err(ErrorKind::Inconsistent.at(&["network.loss_burst", "network.loss"], problem, help))
 }
 
 /// Communication between the vehicles of a flight.

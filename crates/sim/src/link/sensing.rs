@@ -77,7 +77,7 @@ impl ImperfectionSpec for SensingSpec {
             if noise > 0.0 && rate_hz.is_none() {
                 let problem = format!("{what} needs a rate of measurements");
                 let help = "set sensing.rate_hz, such as 100";
-                return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at(key));
+                return Err(ErrorKind::MissingKey.at(&[key], problem, help));
             }
         }
         if rate_hz.is_some() {

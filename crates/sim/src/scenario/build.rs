@@ -105,8 +105,7 @@ fn delta_m(given_m: Option<f64>, safety: Safety) -> Result<f64, ScenarioError> {
         (Some(delta_m), _) => Ok(delta_m),
         (None, Safety::Ellipsoid { half_axes_m: [a_m, ..] }) => Ok(2.0 * a_m),
         (None, Safety::Ball) => {
-            Err(ScenarioError::new(ErrorKind::MissingKey, "missing key `delta_m`", "give the safety distance")
-                .at("law"))
+            Err(ErrorKind::MissingKey.at(&["law"], "missing key `delta_m`", "give the safety distance"))
         }
     }
 }
@@ -114,15 +113,14 @@ fn delta_m(given_m: Option<f64>, safety: Safety) -> Result<f64, ScenarioError> {
 /// Returns the number of vehicles: `swarm.count`, or else the number of start positions, or else of slots.
 fn count(document: &Document) -> Result<usize, ScenarioError> {
     if let Some(count) = document.swarm.count {
-        return usize::try_from(count).map_err(|_| {
-            ScenarioError::new(ErrorKind::OutOfRange, "too many vehicles", "fly fewer vehicles").at("swarm.count")
-        });
+        return usize::try_from(count)
+            .map_err(|_| ErrorKind::OutOfRange.at(&["swarm.count"], "too many vehicles", "fly fewer vehicles"));
     }
     let listed = document.start.positions_m.as_ref().map(Vec::len);
     listed.or(listed_slots(&document.formation.shape)).ok_or_else(|| {
         let problem = "the number of vehicles is missing";
         let help = "add `count` to [swarm], for example count = 6";
-        ScenarioError::new(ErrorKind::MissingKey, problem, help).at("swarm.count")
+        ErrorKind::MissingKey.at(&["swarm.count"], problem, help)
     })
 }
 
@@ -157,12 +155,11 @@ fn space(document: &Document) -> Result<Space, ScenarioError> {
     match document.swarm.dimensions {
         Some(2) => Ok(Space::Plane),
         Some(3) => Ok(Space::Volume),
-        Some(other) => Err(ScenarioError::new(
-            ErrorKind::OutOfRange,
+        Some(other) => Err(ErrorKind::OutOfRange.at(
+            &["swarm.dimensions"],
             format!("`dimensions` must be 2 or 3, got {other}"),
             "2 is the plane z = 0, 3 is space",
-        )
-        .at("swarm.dimensions")),
+        )),
         None => {
             let listed = [&document.start.positions_m, &document.start.velocities_m_s];
             let start_is_flat = listed.into_iter().flatten().all(|points| flat(points))
@@ -181,13 +178,12 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
         (Some(_), Some(_)) => {
             let problem = "both `positions_m` and a `shape` are given";
             let help = "keep one of them";
-            return Err(ScenarioError::new(ErrorKind::ExclusiveKeys, problem, help)
-                .at_keys(["start.shape", "start.positions_m"]));
+            return Err(ErrorKind::ExclusiveKeys.at(&["start.shape", "start.positions_m"], problem, help));
         }
         (None, None) => {
             let problem = "no start positions are given";
             let help = "add positions_m = [[x, y], ...] or a shape, for example shape = \"line\", spacing_m = 3.0";
-            return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at("start"));
+            return Err(ErrorKind::MissingKey.at(&["start"], problem, help));
         }
     };
     start::jitter(&mut positions_m, table.jitter_m, space, &mut random);

@@ -4,7 +4,6 @@
 //! holds its choice (`kind`, `shape`) and the keys of this choice side by side. serde reads the choice as
 //! `kind = { NAME = { keys } }`.
 
-use std::fmt::Display;
 use std::ops::Range;
 
 use toml::Spanned;
@@ -13,87 +12,58 @@ use toml::de::{DeTable, DeValue};
 use super::error::{ErrorKind, ScenarioError, suggest};
 use super::limits::{LARGEST, SMALLEST};
 use super::schema::{Node, tables_with};
+use tautline_core::failure::Place;
 use tautline_core::text::shortest;
 
 /// Longest part of an unknown name that a message repeats \[characters\].
 const NAME_CHARS: usize = 40;
 
-/// A value that the schema does not admit: an error without a place, and the bytes of the value.
-pub(super) struct SchemaError {
-    pub(super) error: ScenarioError,
-    pub(super) span: Range<usize>,
-    /// Dotted path of keys and entries that lead to the value.
-    path: Box<str>,
-}
-
-impl SchemaError {
-    fn new(kind: ErrorKind, problem: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
-        Self { error: ScenarioError::new(kind, problem, help), span, path: "".into() }
-    }
-
-    /// Returns the error of the value below a key or entry.
-    fn child(self, key: impl Display) -> Self {
-        let path = if self.path.is_empty() { key.to_string() } else { format!("{key}.{}", self.path) };
-        Self { path: path.into(), ..self }
-    }
-
-    /// Returns the error about a value that the scenario does not give, with its dotted path as its key.
-    pub(super) fn of_filled_value(self) -> ScenarioError {
-        let ScenarioError { kind, message, .. } = self.error;
-        let path = String::from(self.path);
-        let problem = format!("{path}, which follows from other keys: {message}");
-        let help = format!("give {path} another value, or change the keys that it follows from");
-        ScenarioError::new(kind, problem, help).at(path)
-    }
-
-    /// Returns the error with its dotted path as its key, for a scenario without a text.
-    pub(super) fn without_text(self) -> ScenarioError {
-        self.error.at(String::from(self.path))
-    }
-}
-
-/// Checks a file against the schema and nests its choices.
-///
-/// Spans from `overridden_from` on belong to overrides. A choice of an override drops the keys of the file that belong
-/// to another choice.
-pub(super) fn check_schema(file: &mut Spanned<DeValue<'_>>, overridden_from: usize) -> Result<(), SchemaError> {
-    Check { file: Node::root(), overridden_from }.value(file, Node::root(), "scenario", None)
-}
-
-/// Checks a value of a file without overrides against a part of its schema. `key` names the value.
-pub(super) fn check_value(key: &str, value: &mut Spanned<DeValue<'_>>, node: Node) -> Result<(), SchemaError> {
-    Check { overridden_from: usize::MAX, file: node.whole_file() }.value(value, node, key, None)
-}
-
-/// Checks the TOML of a scenario that no file holds, such as one built in code.
-pub(super) fn check_written(toml: &str) -> Result<(), SchemaError> {
-    let table = DeTable::parse(toml).map_err(|error| {
-        SchemaError::new(ErrorKind::Syntax, error.message(), "give values that TOML can hold", 0..0)
-    })?;
-    check_schema(&mut Spanned::new(0..0, DeValue::Table(table.into_inner())), usize::MAX)
-}
-
-struct Check {
+/// Check of a file, or of a part of it, against its schema.
+pub(super) struct Check<'a> {
     /// Part of the schema for the whole file.
-    file: Node,
-    overridden_from: usize,
+    pub(super) file: Node,
+    /// Begin of the spans of overrides. A choice of an override drops the keys of the file that belong to another
+    /// choice.
+    pub(super) overridden_from: usize,
+    /// Returns the place of a span, for errors.
+    pub(super) locate: &'a dyn Fn(Range<usize>) -> Option<Place>,
 }
 
-impl Check {
+/// Checks the TOML of a scenario that no file holds, such as one built in code. An error has its key, but no place.
+pub(super) fn check_written(toml: &str) -> Result<(), ScenarioError> {
+    let table = DeTable::parse(toml)
+        .map_err(|error| ErrorKind::Syntax.at(&[], error.message(), "give values that TOML can hold"))?;
+    let mut file = Spanned::new(0..0, DeValue::Table(table.into_inner()));
+    Check { file: Node::root(), overridden_from: usize::MAX, locate: &|_| None }.nest(&mut file)
+}
+
+/// Returns the error about a value that the scenario does not give.
+pub(super) fn of_filled_value(ScenarioError { kind, message, keys, .. }: ScenarioError) -> ScenarioError {
+    let path = keys.into_iter().next().unwrap_or_default();
+    let problem = format!("{path}, which follows from other keys: {message}");
+    let help = format!("give {path} another value, or change the keys that it follows from");
+    kind.at(&[&path], problem, help)
+}
+
+impl Check<'_> {
+    /// Checks a whole file, and nests its choices.
+    pub(super) fn nest(&self, file: &mut Spanned<DeValue<'_>>) -> Result<(), ScenarioError> {
+        self.value(file, self.file, "scenario", None)
+    }
+
     /// Checks a value. `name` is the key of the value; `own_name` replaces a missing tag.
-    fn value(
+    pub(super) fn value(
         &self,
         value: &mut Spanned<DeValue<'_>>,
         node: Node,
         name: &str,
         own_name: Option<&(&str, Range<usize>)>,
-    ) -> Result<(), SchemaError> {
+    ) -> Result<(), ScenarioError> {
         let span = value.span();
         if let (Some(node), DeValue::Table(table)) = (node.values(), value.get_mut()) {
             return table.iter_mut().try_for_each(|(key, value)| {
                 let name = &**key.get_ref();
-                self.value(value, node, name, Some(&(name, key.span())))
-                    .map_err(|schema_error| schema_error.child(name))
+                self.value(value, node, name, Some(&(name, key.span()))).map_err(|error| error.below(name))
             });
         }
         if node.keyword("additionalProperties") == true && value.get_ref().is_table() {
@@ -102,15 +72,15 @@ impl Check {
         if node.is_table() {
             return match value.get_mut() {
                 DeValue::Table(table) => self.table(table, node, &span, own_name),
-                other => Err(wrong_type(name, node, other, span)),
+                other => Err(self.wrong_type(name, node, other, span)),
             };
         }
         let words = node.words();
         if !words.is_empty() {
             return match value.get_ref().as_str() {
                 Some(word) if words.contains(&word) => Ok(()),
-                Some(word) => Err(unknown_choice(word, &words, span)),
-                None => Err(wrong_type(name, node, value.get_ref(), span)),
+                Some(word) => Err(self.unknown_choice(word, &words, span)),
+                None => Err(self.wrong_type(name, node, value.get_ref(), span)),
             };
         }
         let alternatives = node.alternatives();
@@ -118,27 +88,27 @@ impl Check {
             let admitting: Vec<_> =
                 alternatives.into_iter().filter(|part| admits(*part, value.get_ref().type_str())).collect();
             let part = match (&admitting[..], value.get_ref()) {
-                ([], _) => return Err(wrong_type(name, node, value.get_ref(), span)),
+                ([], _) => return Err(self.wrong_type(name, node, value.get_ref(), span)),
                 (parts @ [_, _, ..], DeValue::Table(table)) => self.named_by_key(name, parts, table, span)?,
                 (&[first, ..], _) => first,
             };
             return self.value(value, part, name, None);
         }
         if !admits(node, value.get_ref().type_str()) {
-            return Err(wrong_type(name, node, value.get_ref(), span));
+            return Err(self.wrong_type(name, node, value.get_ref(), span));
         }
         match value.get_mut() {
             DeValue::Array(list) => {
-                check_length(name, node, list.len(), span)?;
+                self.check_length(name, node, list.len(), span)?;
                 let Some(node) = node.items() else { return Ok(()) };
                 list.iter_mut().enumerate().try_for_each(|(entry, value)| {
-                    self.value(value, node, name, None).map_err(|schema_error| schema_error.child(entry + 1))
+                    self.value(value, node, name, None).map_err(|error| error.below(entry + 1))
                 })
             }
             DeValue::Integer(written) => {
                 let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
                     let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
-                    return Err(out_of_range(
+                    return Err(self.out_of_range(
                         name,
                         node,
                         &format!("at most {most} in magnitude"),
@@ -146,12 +116,12 @@ impl Check {
                         span,
                     ));
                 };
-                in_range(name, node, whole as f64, || whole.to_string(), span)
+                self.in_range(name, node, whole as f64, || whole.to_string(), span)
             }
             DeValue::Float(written) => {
                 let number: f64 = written.as_str().parse().unwrap_or(f64::NAN);
                 let shown = || if number.is_finite() { shortest(number) } else { written.as_str().to_owned() };
-                in_range(name, node, number, shown, span)
+                self.in_range(name, node, number, shown, span)
             }
             _ => Ok(()),
         }
@@ -164,26 +134,26 @@ impl Check {
         parts: &[Node],
         table: &DeTable<'_>,
         span: Range<usize>,
-    ) -> Result<Node, SchemaError> {
+    ) -> Result<Node, ScenarioError> {
         let names: Vec<_> = parts.iter().flat_map(|part| part.keys()).collect();
         let mut keys = table.keys();
         let (Some(key), None) = (keys.next(), keys.next()) else {
             let message = format!("`{}` must have one key, got {}", short(name), table.len());
             let help = format!("give one of {}", names.join(", "));
-            return Err(SchemaError::new(ErrorKind::WrongType, message, help, span));
+            return Err(self.refuse(ErrorKind::WrongType, message, help, span));
         };
         let of_key = parts.iter().copied().find(|part| part.property(key.get_ref()).is_some());
         of_key.ok_or_else(|| self.unknown_key(key.get_ref(), names, key.span()))
     }
 
-    fn unknown_key(&self, name: &str, mut known: Vec<&str>, span: Range<usize>) -> SchemaError {
+    fn unknown_key(&self, name: &str, mut known: Vec<&str>, span: Range<usize>) -> ScenarioError {
         known.sort_unstable();
         known.dedup();
         let help = match tables_with(self.file, name)[..] {
             [] => suggest(name, &known),
             ref tables => format!("`{name}` belongs in {}; {}", tables.join(", or "), suggest(name, &known)),
         };
-        SchemaError::new(ErrorKind::UnknownKey, format!("unknown key `{}`", short(name)), help, span).child(name)
+        self.refuse(ErrorKind::UnknownKey, format!("unknown key `{}`", short(name)), help, span).below(name)
     }
 
     fn table(
@@ -192,7 +162,7 @@ impl Check {
         node: Node,
         span: &Range<usize>,
         own_name: Option<&(&str, Range<usize>)>,
-    ) -> Result<(), SchemaError> {
+    ) -> Result<(), ScenarioError> {
         let alternatives: Vec<_> = node.alternatives().into_iter().filter(|part| part.tag().is_some()).collect();
         let choice = match alternatives.first().and_then(|part| part.tag()) {
             Some((tag, _)) => self.choice(table, tag, &alternatives, span, own_name, node)?,
@@ -212,15 +182,14 @@ impl Check {
             };
             // `choice` has checked the tag.
             if node.keyword("const").is_null() {
-                self.value(value, node, name, None).map_err(|schema_error| schema_error.child(name))?;
+                self.value(value, node, name, None).map_err(|error| error.below(name))?;
             }
         }
         let required = node.required().chain(chosen.into_iter().flat_map(Node::required));
         if let Some(missing) = required.into_iter().find(|key| !table.contains_key(*key)) {
             let help = format!("`{missing}` is {}", known(missing).map_or_else(String::new, expected));
-            let schema_error =
-                SchemaError::new(ErrorKind::MissingKey, format!("missing key `{missing}`"), help, span.clone());
-            return Err(schema_error);
+            let problem = format!("missing key `{missing}`");
+            return Err(self.refuse(ErrorKind::MissingKey, problem, help, span.clone()));
         }
         if let Some((chosen, tag_span)) = choice {
             nest_choice(table, node, chosen, tag_span);
@@ -237,16 +206,14 @@ impl Check {
         span: &Range<usize>,
         own_name: Option<&(&str, Range<usize>)>,
         node: Node,
-    ) -> Result<Option<(Node, Range<usize>)>, SchemaError> {
+    ) -> Result<Option<(Node, Range<usize>)>, ScenarioError> {
         let names: Vec<_> = alternatives.iter().filter_map(|part| part.tag()).map(|(_, name)| name).collect();
         let default = alternatives.iter().find(|part| !part.requires(tag)).and_then(|part| part.tag());
         let (name, tag_span) = match (table.get(tag), own_name, default) {
             (Some(value), ..) => {
                 let Some(name) = value.get_ref().as_str() else {
                     let message = format!("`{tag}` must be {}, got {}", listed(&names), found(value.get_ref()));
-                    return Err(
-                        SchemaError::new(ErrorKind::WrongType, message, description(node), value.span()).child(tag)
-                    );
+                    return Err(self.refuse(ErrorKind::WrongType, message, description(node), value.span()).below(tag));
                 };
                 (name, value.span())
             }
@@ -256,21 +223,16 @@ impl Check {
             (None, None, None) if node.keyword("anyOf").is_array() => return Ok(None),
             (None, None, None) => {
                 let help = format!("give one of {}", listed(&names));
-                return Err(SchemaError::new(
-                    ErrorKind::MissingKey,
-                    format!("missing key `{tag}`"),
-                    help,
-                    span.clone(),
-                ));
+                return Err(self.refuse(ErrorKind::MissingKey, format!("missing key `{tag}`"), help, span.clone()));
             }
         };
         let Some(&chosen) = alternatives.iter().find(|part| part.tag().is_some_and(|(_, known)| known == name)) else {
-            let mut schema_error = unknown_choice(name, &names, tag_span);
+            let mut error = self.unknown_choice(name, &names, tag_span);
             if own_name.is_some() && !table.contains_key(tag) {
                 let unless = "the name of a law is its kind unless the table [laws.NAME] has a `kind`: ";
-                schema_error.error.help.insert_str(0, unless);
+                error.help.insert_str(0, unless);
             }
-            return Err(schema_error.child(tag));
+            return Err(error.below(tag));
         };
         if tag_span.start >= self.overridden_from {
             let is_left = |key: &str, value: &Spanned<DeValue<'_>>| {
@@ -286,6 +248,78 @@ impl Check {
             }
         }
         Ok(Some((chosen, tag_span)))
+    }
+
+    /// Refuses a list that is shorter or longer than the schema allows.
+    fn check_length(&self, name: &str, node: Node, length: usize, span: Range<usize>) -> Result<(), ScenarioError> {
+        let bound = |keyword: &str| node.keyword(keyword).as_u64();
+        let lengths = bound("minItems").unwrap_or(0)..=bound("maxItems").unwrap_or(u64::MAX);
+        if lengths.contains(&(length as u64)) {
+            return Ok(());
+        }
+        let message = format!("`{}` must be {}, got a list of {length}", short(name), expected(node));
+        Err(self.refuse(ErrorKind::WrongType, message, description(node), span))
+    }
+
+    /// Refuses a number that is not finite, outside the bounds of the schema, or outside [`SMALLEST`] to [`LARGEST`].
+    fn in_range(
+        &self,
+        name: &str,
+        node: Node,
+        number: f64,
+        shown: impl FnOnce() -> String,
+        span: Range<usize>,
+    ) -> Result<(), ScenarioError> {
+        let bound = |keyword: &str| node.keyword(keyword).as_f64();
+        let refuse = |must: String| Err(self.out_of_range(name, node, &must, &shown(), span));
+        if !number.is_finite() {
+            return refuse("a finite number".to_owned());
+        }
+        match (bound("exclusiveMinimum"), bound("minimum"), bound("maximum")) {
+            (Some(least), ..) if number <= least => return refuse(format!("more than {least}")),
+            (_, Some(least), Some(most)) if number < least || number > most => {
+                return refuse(format!("from {least} to {most}"));
+            }
+            (_, Some(least), _) if number < least => return refuse(format!("at least {least}")),
+            (_, _, Some(most)) if number > most => return refuse(format!("at most {most}")),
+            _ => {}
+        }
+        if node.kind() == "integer" {
+            return Ok(());
+        }
+        if number.abs() > LARGEST {
+            return refuse(format!("at most {LARGEST:e} in magnitude"));
+        }
+        if bound("exclusiveMinimum") == Some(0.0) && number < SMALLEST {
+            return refuse(format!("at least {SMALLEST:e}"));
+        }
+        Ok(())
+    }
+
+    fn out_of_range(&self, name: &str, node: Node, must: &str, number: &str, span: Range<usize>) -> ScenarioError {
+        let message = format!("`{name}` must be {must}, got {number}");
+        self.refuse(ErrorKind::OutOfRange, message, description(node), span)
+    }
+
+    fn unknown_choice(&self, name: &str, known: &[&str], span: Range<usize>) -> ScenarioError {
+        let message = format!("unknown choice `{}`", short(name));
+        self.refuse(ErrorKind::UnknownChoice, message, suggest(name, known), span)
+    }
+
+    fn wrong_type(&self, name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> ScenarioError {
+        let message = format!("`{}` must be {}, got {}", short(name), expected(node), found(value));
+        self.refuse(ErrorKind::WrongType, message, description(node), span)
+    }
+
+    /// Returns an error about the bytes of a value.
+    fn refuse(
+        &self,
+        kind: ErrorKind,
+        problem: impl AsRef<str>,
+        help: impl AsRef<str>,
+        span: Range<usize>,
+    ) -> ScenarioError {
+        ScenarioError { place: (self.locate)(span).map(Box::new), ..kind.at(&[], problem, help) }
     }
 }
 
@@ -310,66 +344,6 @@ fn admits(node: Node, type_name: &str) -> bool {
         "float" => node.kind() == "number",
         other => node.kind() == other,
     }
-}
-
-/// Refuses a list that is shorter or longer than the schema allows.
-fn check_length(name: &str, node: Node, length: usize, span: Range<usize>) -> Result<(), SchemaError> {
-    let bound = |keyword: &str| node.keyword(keyword).as_u64();
-    let lengths = bound("minItems").unwrap_or(0)..=bound("maxItems").unwrap_or(u64::MAX);
-    if lengths.contains(&(length as u64)) {
-        return Ok(());
-    }
-    let message = format!("`{}` must be {}, got a list of {length}", short(name), expected(node));
-    Err(SchemaError::new(ErrorKind::WrongType, message, description(node), span))
-}
-
-/// Refuses a number that is not finite, outside the bounds of the schema, or outside [`SMALLEST`] to [`LARGEST`].
-fn in_range(
-    name: &str,
-    node: Node,
-    number: f64,
-    shown: impl FnOnce() -> String,
-    span: Range<usize>,
-) -> Result<(), SchemaError> {
-    let bound = |keyword: &str| node.keyword(keyword).as_f64();
-    let refuse = |must: String| Err(out_of_range(name, node, &must, &shown(), span));
-    if !number.is_finite() {
-        return refuse("a finite number".to_owned());
-    }
-    match (bound("exclusiveMinimum"), bound("minimum"), bound("maximum")) {
-        (Some(least), ..) if number <= least => return refuse(format!("more than {least}")),
-        (_, Some(least), Some(most)) if number < least || number > most => {
-            return refuse(format!("from {least} to {most}"));
-        }
-        (_, Some(least), _) if number < least => return refuse(format!("at least {least}")),
-        (_, _, Some(most)) if number > most => return refuse(format!("at most {most}")),
-        _ => {}
-    }
-    if node.kind() == "integer" {
-        return Ok(());
-    }
-    if number.abs() > LARGEST {
-        return refuse(format!("at most {LARGEST:e} in magnitude"));
-    }
-    if bound("exclusiveMinimum") == Some(0.0) && number < SMALLEST {
-        return refuse(format!("at least {SMALLEST:e}"));
-    }
-    Ok(())
-}
-
-fn out_of_range(name: &str, node: Node, must: &str, number: &str, span: Range<usize>) -> SchemaError {
-    let message = format!("`{name}` must be {must}, got {number}");
-    SchemaError::new(ErrorKind::OutOfRange, message, description(node), span)
-}
-
-fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> SchemaError {
-    let message = format!("unknown choice `{}`", short(name));
-    SchemaError::new(ErrorKind::UnknownChoice, message, suggest(name, known), span)
-}
-
-fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> SchemaError {
-    let message = format!("`{}` must be {}, got {}", short(name), expected(node), found(value));
-    SchemaError::new(ErrorKind::WrongType, message, description(node), span)
 }
 
 /// Returns a value in words.

@@ -46,8 +46,8 @@ impl DrawingSize {
                 let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
                 let problem = "more than one of `height_m`, `width_m` and `spacing_m` are given";
                 let help = "keep one of them: each sets the size of the drawing";
-                let error = ScenarioError::new(ErrorKind::ExclusiveKeys, problem, help);
-                Err(given.into_iter().filter(|(_, given)| given.is_some()).fold(error, |error, (key, _)| error.at(key)))
+                let keys: Vec<_> = given.into_iter().filter_map(|(key, given)| given.map(|_| key)).collect();
+                Err(ErrorKind::ExclusiveKeys.at(&keys, problem, help))
             }
         }
     }
@@ -76,7 +76,7 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
                 (ErrorKind::MissingKey, "neither `path` nor `file` is given")
             };
             let help = "give path = \"M 0 0 L ...\", or file = \"drawing.svg\"";
-            return Err(ScenarioError::new(kind, said, help).at_keys([PATH, files::KEY]));
+            return Err(kind.at(&[PATH, files::KEY], said, help));
         }
     };
     sized(&drawing, size, count, delta_m, key)
@@ -103,7 +103,7 @@ fn sized(
     if nearest == 0.0 {
         let problem = format!("slots {pair} of the drawing are the same point");
         let help = "draw longer lines or larger areas, or fly fewer vehicles";
-        return Err(ScenarioError::new(ErrorKind::WithinDelta, problem, help).at_keys([key, "swarm.count"]));
+        return Err(ErrorKind::WithinDelta.at(&[key, "swarm.count"], problem, help));
     }
     let scale = match size {
         Size::Spacing(spacing_m) => spacing_m / nearest,
@@ -129,7 +129,7 @@ impl Dimension {
         if drawn == 0.0 {
             let problem = format!("the drawing is a straight line, which cannot be {asked_m} m {name}");
             let help = "give its other dimension, or spacing_m";
-            return Err(ScenarioError::new(ErrorKind::Shape, problem, help).at(key));
+            return Err(ErrorKind::Shape.at(&[key], problem, help));
         }
         let scale = asked_m / drawn;
         let nearest_m = scale * nearest;
@@ -145,7 +145,7 @@ impl Dimension {
             "set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer \
              vehicles"
         );
-        Err(ScenarioError::new(ErrorKind::WithinDelta, problem, help).at_keys([key, "swarm.count", "law.delta_m"]))
+        Err(ErrorKind::WithinDelta.at(&[key, "swarm.count", "law.delta_m"], problem, help))
     }
 }
 
@@ -172,10 +172,7 @@ fn refused(error: &DrawingError, key: &'static str, file: Option<&Path>) -> Scen
         DrawingError::Slots(_) => format!("fly at most {MAX_DRAWN_SLOTS} vehicles"),
     };
     let shown = file.map_or_else(String::new, |file| format!("{}: ", file.display()));
-    let refused = ScenarioError::new(ErrorKind::Shape, format!("{shown}{error}"), help).at(key);
-    if matches!(error, DrawingError::Letters { .. } | DrawingError::Slots(_)) {
-        refused.at("swarm.count")
-    } else {
-        refused
-    }
+    let is_of_count = matches!(error, DrawingError::Letters { .. } | DrawingError::Slots(_));
+    let keys = [key, "swarm.count"];
+    ErrorKind::Shape.at(if is_of_count { &keys } else { &keys[..1] }, format!("{shown}{error}"), help)
 }

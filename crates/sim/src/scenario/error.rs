@@ -1,6 +1,5 @@
 //! Errors of scenarios: place, message and remedy.
 
-use std::borrow::Cow;
 use std::fmt;
 
 use tautline_core::failure::{Failure, LONGEST_LINE, Place};
@@ -18,8 +17,10 @@ pub struct ScenarioError {
     pub message: String,
     /// The remedy.
     pub help: String,
-    /// Keys that are part of the problem. The error is placed at the first one, unless an override set another one.
-    pub fields: Vec<Field>,
+    /// Keys that are part of the problem, as an override names them: `start.positions_m.2` is the position of vehicle 2,
+    /// and `leg.1.points_m.2` its slot in the first `[[leg]]`. The error is placed at the first one, unless an override
+    /// set another one.
+    pub keys: Vec<String>,
     /// Place in the text; `None` for a scenario built in code, and for a file that could not be read.
     pub place: Option<Box<Place>>,
 }
@@ -120,73 +121,63 @@ kinds! {
     WrongType = "scenario/wrong-type",
 }
 
-/// Key of the scenario file, or an entry of the list that it holds. Displayed as an override names it:
-/// `start.positions_m.2` is the position of vehicle 2, and `leg.1.points_m.2` its slot in the first `[[leg]]`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Field {
-    /// Dotted path of the key, such as `time.dt_s`.
-    pub key: Cow<'static, str>,
-    /// Entry of a list, from 0.
-    pub entry: Option<usize>,
-    /// Leg that has the key, from 0: the first is `[formation]`, the others are `[[leg]]`. 0 for keys outside legs.
-    pub leg: usize,
+impl ErrorKind {
+    /// Returns an error at keys. The first key is the place of the error, unless an override set another one.
+    pub(crate) fn at(self, keys: &[&str], problem: impl AsRef<str>, help: impl AsRef<str>) -> ScenarioError {
+        let [message, help] = [problem.as_ref(), help.as_ref()].map(printable);
+        ScenarioError { kind: self, message, help, keys: Vec::new(), place: None }.at(keys)
+    }
+}
+
+/// Returns the path of an entry of a list, from 0.
+pub(crate) fn entry_key(list: &str, entry: usize) -> String {
+    format!("{list}.{}", entry + 1)
+}
+
+/// Returns the path of a key of a leg, from 0: the first is `[formation]`, the others are `[[leg]]`.
+pub(super) fn leg_key(leg: usize, key: &str) -> String {
+    if leg == 0 { format!("formation.{key}") } else { format!("leg.{leg}.{key}") }
 }
 
 impl ScenarioError {
-    pub(crate) fn new(kind: ErrorKind, problem: impl AsRef<str>, help: impl AsRef<str>) -> Self {
-        let [message, help] = [problem.as_ref(), help.as_ref()].map(printable);
-        Self { kind, message, help, fields: Vec::new(), place: None }
-    }
-
-    /// Adds a key that is part of the problem. The error is placed at the first key, unless an override set another
-    /// one.
-    pub(crate) fn at(mut self, key: impl Into<Cow<'static, str>>) -> Self {
-        self.fields.push(Field { key: key.into(), entry: None, leg: 0 });
+    /// Adds keys; see [`ErrorKind::at`].
+    pub(crate) fn at(mut self, keys: &[&str]) -> Self {
+        self.keys.extend(keys.iter().map(|&key| key.to_owned()));
         self
     }
 
-    /// Adds several keys; see [`ScenarioError::at`].
-    pub(crate) fn at_keys<const N: usize>(self, keys: [&'static str; N]) -> Self {
-        keys.into_iter().fold(self, Self::at)
-    }
-
-    /// Adds an entry of a list; see [`ScenarioError::at`].
-    pub(crate) fn at_entry(mut self, key: &'static str, entry: usize) -> Self {
-        self.fields.push(Field { key: key.into(), entry: Some(entry), leg: 0 });
-        self
-    }
-
-    /// Adds a key of `[formation]` or, for a later leg, of its `[[leg]]`; see [`ScenarioError::at`].
-    pub(super) fn at_leg(mut self, leg: usize, key: &'static str) -> Self {
-        self.fields.push(Field { key: key.into(), entry: None, leg });
-        self
-    }
-
-    /// Moves the added keys of `[formation]` to a leg.
+    /// Moves the keys of `[formation]` to a leg.
     pub(super) fn on_leg(mut self, leg: usize) -> Self {
-        self.fields.iter_mut().filter(|field| field.key.starts_with("formation")).for_each(|field| field.leg = leg);
+        for key in &mut self.keys {
+            if let Some(rest) = key.strip_prefix("formation.") {
+                *key = leg_key(leg, rest);
+            }
+        }
         self
     }
 
-    /// Adds an entry of a list of a leg; see [`ScenarioError::at_leg`].
-    pub(super) fn at_leg_entry(mut self, leg: usize, key: &'static str, entry: usize) -> Self {
-        self.fields.push(Field { key: key.into(), entry: Some(entry), leg });
+    /// Puts the key of the table, or the entry of the list, in front of the first key.
+    pub(super) fn below(mut self, key: impl fmt::Display) -> Self {
+        match self.keys.first_mut() {
+            Some(first) => first.insert_str(0, &format!("{key}.")),
+            None => self.keys.push(key.to_string()),
+        }
         self
     }
 
     /// Adds `start.jitter_m` to the causes of two starts within delta, if the jitter moved the starts.
     pub(super) fn with_jitter(mut self, jitter_m: f64) -> Self {
-        let is_of_starts = self.fields.first().is_some_and(|field| field.key == "start.positions_m");
+        let is_of_starts = self.keys.first().is_some_and(|key| key.starts_with("start.positions_m"));
         if jitter_m == 0.0 || self.kind != ErrorKind::WithinDelta || !is_of_starts {
             return self;
         }
         self.message = format!("{}; start.jitter_m moved each coordinate by up to {jitter_m} m", self.message);
         self.help = String::from("reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m");
-        self.fields.insert(0, Field { key: "start.jitter_m".into(), entry: None, leg: 0 });
+        self.keys.insert(0, "start.jitter_m".to_owned());
         self
     }
 
-    pub(super) fn with_place(mut self, place: Place) -> Self {
+    pub(crate) fn with_place(mut self, place: Place) -> Self {
         self.place = Some(Box::new(place));
         self
     }
@@ -202,24 +193,14 @@ impl std::error::Error for ScenarioError {}
 
 impl fmt::Display for ScenarioError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.place, self.fields.first()) {
+        match (&self.place, self.keys.first()) {
             (Some(place), _) => {
                 write!(f, "{}:{}:{}: {}", printable(&place.source), place.line, place.column, self.message)?;
             }
-            (None, Some(field)) => write!(f, "{field}: {}", self.message)?,
+            (None, Some(key)) => write!(f, "{key}: {}", self.message)?,
             (None, None) => f.write_str(&self.message)?,
         }
         write!(f, "\n  help: {}", self.help)
-    }
-}
-
-impl fmt::Display for Field {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.leg, self.key.strip_prefix("formation")) {
-            (1.., Some(key)) => write!(f, "leg.{}{key}", self.leg)?,
-            _ => f.write_str(&self.key)?,
-        }
-        self.entry.map_or(Ok(()), |entry| write!(f, ".{}", entry + 1))
     }
 }
 
@@ -272,8 +253,8 @@ impl From<ScenarioError> for Failure {
         if error.place.as_ref().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
             return Self::new(error.code(), false, error.to_string());
         }
-        let message = match error.fields.first().filter(|_| error.place.is_none()) {
-            Some(field) => format!("{field}: {}", error.message),
+        let message = match error.keys.first().filter(|_| error.place.is_none()) {
+            Some(key) => format!("{key}: {}", error.message),
             None => error.message.clone(),
         };
         let failure = Self::input(error.code(), message, &error.help);
@@ -288,24 +269,21 @@ mod tests {
     #[test]
     fn an_error_shows_place_and_remedy_in_plain_text() {
         let text = "name = \"a\"\nside_m = 2.0\n";
-        let error = ScenarioError::new(ErrorKind::OutOfRange, "too small", "enlarge it");
+        let error = ErrorKind::OutOfRange.at(&[], "too small", "enlarge it");
         let error = error.with_place(Place::new("f.toml", text, 20..23));
         assert_eq!(error.to_string(), "f.toml:2:10: too small\n  help: enlarge it");
     }
 
     #[test]
     fn without_a_text_the_key_is_the_place() {
-        let error = ScenarioError::new(ErrorKind::OutOfRange, "is zero", "enlarge it").at_entry("swarm.mass_kg", 1);
+        let error = ErrorKind::OutOfRange.at(&[&entry_key("swarm.mass_kg", 1)], "is zero", "enlarge it");
         assert_eq!(error.to_string(), "swarm.mass_kg.2: is zero\n  help: enlarge it");
     }
 
     #[test]
     fn control_characters_of_the_input_do_not_reach_the_terminal() {
-        let error = ScenarioError::new(ErrorKind::UnknownKey, "key \u{1b}[2J", "\u{1b}[2J").with_place(Place::new(
-            "f",
-            "\u{1b}[2J",
-            0..1,
-        ));
+        let error =
+            ErrorKind::UnknownKey.at(&[], "key \u{1b}[2J", "\u{1b}[2J").with_place(Place::new("f", "\u{1b}[2J", 0..1));
         assert!(!error.to_string().contains('\u{1b}'));
     }
 

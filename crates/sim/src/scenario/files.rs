@@ -19,7 +19,7 @@ const MAX_BYTES: u64 = 128 << 20;
 /// Reads a file of at most [`MAX_BYTES`]; `key` is the key that names it.
 pub(super) fn bytes(path: &Path, key: &'static str) -> Result<Vec<u8>, ScenarioError> {
     let shown = path.display();
-    let refused = |said: String, help: &str| ScenarioError::new(ErrorKind::File, said, help).at(key);
+    let refused = |said: String, help: &str| ErrorKind::File.at(&[key], said, help);
     let unreadable = |error: std::io::Error| {
         let help = "give the path of a readable file, relative to the folder of the scenario file or to the working \
                     directory";
@@ -104,7 +104,7 @@ impl Columns {
 
     /// Returns an error about a line of the file.
     pub(super) fn refused(&self, path: &Path, line: u64, said: &str) -> ScenarioError {
-        ScenarioError::new(ErrorKind::File, format!("{}:{line}: {said}", path.display()), self.help).at(self.key)
+        ErrorKind::File.at(&[self.key], format!("{}:{line}: {said}", path.display()), self.help)
     }
 
     /// Returns the position of each column, and whether the first line is a heading.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::document::{
     Assignment, FormationShape, FormationTable, HelixKeys, LegStart, LegTable, Placement, Point, rows,
 };
-use super::error::{ErrorKind, ScenarioError};
+use super::error::{ErrorKind, ScenarioError, leg_key};
 use super::limits::{DEFAULT_SPACING, rounded_up};
 use super::spec::Scenario;
 use tautline_core::swarm::{Rows, row, set_row};
@@ -51,9 +51,7 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
     if scenario.count() > most {
         let problem = format!("an assignment needs at most {most} vehicles, got {}", scenario.count());
         let help = "set assignment to \"given\", or reduce swarm.count";
-        return Err(
-            ScenarioError::new(ErrorKind::OutOfRange, problem, help).at_keys(["formation.assignment", "swarm.count"])
-        );
+        return Err(ErrorKind::OutOfRange.at(&["formation.assignment", "swarm.count"], problem, help));
     }
     Ok(Some(freedom))
 }
@@ -75,9 +73,7 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
     }
     let help =
         "set assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and deadlock.mode to \"auto\"";
-    Err(ScenarioError::new(ErrorKind::UnsupportedByLaw, why, help)
-        .at_leg(leg, "formation.assignment")
-        .at_keys(["law.kind", "deadlock.mode"]))
+    Err(ErrorKind::UnsupportedByLaw.at(&[&leg_key(leg, "assignment"), "law.kind", "deadlock.mode"], why, help))
 }
 
 /// Assigns slots with the least sum of squared distances from the positions `from_m` \[m\]; a leader keeps its slot.
@@ -139,9 +135,7 @@ pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), Scenari
         if let Some(slots) = slots.filter(|&slots| slots != count) {
             let problem = format!("leg {} has {slots} slots for {count} vehicles", number + 2);
             let help = "every leg needs a slot for each vehicle";
-            return Err(ScenarioError::new(ErrorKind::CountMismatch, problem, help)
-                .at_leg(number + 1, "formation.points_m")
-                .at("swarm.count"));
+            return Err(ErrorKind::CountMismatch.at(&[&leg_key(number + 1, "points_m"), "swarm.count"], problem, help));
         }
     }
     Ok(())
@@ -178,7 +172,7 @@ pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> R
 fn without_drawings() -> ScenarioError {
     let problem = "a drawing needs the feature `drawn`, which this build lacks";
     let help = "build tautline-sim with the feature `drawn`, or list the slots: shape = \"points\" or \"file\"";
-    ScenarioError::new(ErrorKind::Shape, problem, help).at("formation.shape")
+    ErrorKind::Shape.at(&["formation.shape"], problem, help)
 }
 
 /// Resolves the file of a shape relative to a folder, and replaces a file of points by a list.
@@ -219,8 +213,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         if keys.spacing_m.is_some() {
             let problem = "both `spacing_m` and `turns` are given";
             let help = "keep one of them";
-            return Err(ScenarioError::new(ErrorKind::ExclusiveKeys, problem, help)
-                .at_keys(["formation.turns", "formation.spacing_m"]));
+            return Err(ErrorKind::ExclusiveKeys.at(&["formation.turns", "formation.spacing_m"], problem, help));
         }
         let step_rad = std::f64::consts::TAU * turns / count.saturating_sub(1).max(1) as f64;
         return Ok(Formation::helix(count, radius_m, pitch_m, step_rad));
@@ -229,9 +222,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
     let Some(step_rad) = Formation::helix_step_rad(radius_m, pitch_m, spacing_m) else {
         let problem = format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m");
         let help = format!("enlarge formation.radius_m to at least {}", 0.5 * spacing_m);
-        return Err(
-            ScenarioError::new(ErrorKind::Shape, problem, help).at_keys(["formation.radius_m", "formation.spacing_m"])
-        );
+        return Err(ErrorKind::Shape.at(&["formation.radius_m", "formation.spacing_m"], problem, help));
     };
     let keeps = |pitch_m: f64, step_rad: f64| {
         Formation::helix_nearest_m(count, radius_m, pitch_m, step_rad) >= spacing_m * (1.0 - ROUNDING)
@@ -247,9 +238,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         let enough_m = steeper.skip(1).find(enough).unwrap_or(2.0 * spacing_m);
         let problem = format!("turns {pitch_m} m above each other do not keep a spacing of {spacing_m} m");
         let help = format!("enlarge formation.pitch_m to {}, or reduce formation.spacing_m", rounded_up(enough_m));
-        return Err(
-            ScenarioError::new(ErrorKind::Shape, problem, help).at_keys(["formation.pitch_m", "formation.spacing_m"])
-        );
+        return Err(ErrorKind::Shape.at(&["formation.pitch_m", "formation.spacing_m"], problem, help));
     }
     Ok(Formation::helix(count, radius_m, pitch_m, step_rad))
 }

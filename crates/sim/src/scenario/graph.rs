@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::Edge;
-use super::error::{ErrorKind, ScenarioError};
+use super::error::{ErrorKind, ScenarioError, entry_key};
 use super::limits::pair_count;
 use tautline_laws::graph::{Graph, GraphError};
 
@@ -102,7 +102,7 @@ fn index(number: u64) -> Option<usize> {
 fn star(hub: u64, count: usize) -> Result<Graph, ScenarioError> {
     index(hub).filter(|&hub| hub < count).map(|hub| Graph::star_about(count, hub)).ok_or_else(|| {
         let problem = format!("the hub must be a vehicle from 1 to {count}, got {hub}");
-        ScenarioError::new(ErrorKind::UnknownVehicle, problem, "vehicles are counted from 1").at("graph.hub")
+        ErrorKind::UnknownVehicle.at(&["graph.hub"], problem, "vehicles are counted from 1")
     })
 }
 
@@ -112,7 +112,7 @@ fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, Scenario
     if !(1..=most).contains(&degree) {
         let problem = format!("the mean number of links must be from 1 to {most}, got {degree}");
         let help = "a connected graph has a mean degree of about 2 or more";
-        return Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help).at("graph.degree"));
+        return Err(ErrorKind::OutOfRange.at(&["graph.degree"], problem, help));
     }
     let edges = usize::try_from(random_edge_count(degree, count)).unwrap_or(usize::MAX);
     let mut numbers = super::start::random(seed);
@@ -123,7 +123,7 @@ fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
     let indices = edges.iter().enumerate().map(|(entry, Edge([a, b]))| {
         index(*a).zip(index(*b)).ok_or_else(|| {
             let problem = format!("edge {} names vehicle 0", entry + 1);
-            ScenarioError::new(ErrorKind::Edge, problem, "vehicles are counted from 1").at_entry("graph.edges", entry)
+            ErrorKind::Edge.at(&[&entry_key("graph.edges", entry)], problem, "vehicles are counted from 1")
         })
     });
     let indices = indices.collect::<Result<Vec<_>, _>>()?;
@@ -133,6 +133,6 @@ fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
         | GraphError::Duplicate { edge, .. }) = error;
         let problem = error.to_string();
         let help = "list each pair of different vehicles once, in either order";
-        ScenarioError::new(ErrorKind::Edge, problem, help).at_entry("graph.edges", edge)
+        ErrorKind::Edge.at(&[&entry_key("graph.edges", edge)], problem, help)
     })
 }

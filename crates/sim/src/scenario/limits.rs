@@ -56,7 +56,7 @@ pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
         return Ok(());
     }
     let problem = format!("a swarm needs at least 2 vehicles, got {count}");
-    Err(ScenarioError::new(ErrorKind::OutOfRange, problem, "add vehicles").at("swarm.count"))
+    Err(ErrorKind::OutOfRange.at(&["swarm.count"], problem, "add vehicles"))
 }
 
 /// Refuses lists whose length is not the number of vehicles. Each list has a key, a description and a length.
@@ -65,12 +65,11 @@ pub(super) fn check_lengths<const N: usize>(
     lists: [(&'static str, &str, Option<usize>); N],
 ) -> Result<(), ScenarioError> {
     match lists.into_iter().find(|&(.., length)| length.is_some_and(|length| length != count)) {
-        Some((key, what, Some(length))) => Err(ScenarioError::new(
-            ErrorKind::CountMismatch,
+        Some((key, what, Some(length))) => Err(ErrorKind::CountMismatch.at(
+            &[key, "swarm.count"],
             format!("{length} {what} for {count} vehicles"),
             "the number of vehicles is swarm.count if given, or else the number of start positions",
-        )
-        .at_keys([key, "swarm.count"])),
+        )),
         _ => Ok(()),
     }
 }
@@ -88,7 +87,7 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
         MAX_MEMORY_BYTES >> 30
     );
     let help = "fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"";
-    Err(ScenarioError::new(ErrorKind::Memory, problem, help).at_keys(["swarm.count", "graph.kind"]))
+    Err(ErrorKind::Memory.at(&["swarm.count", "graph.kind"], problem, help))
 }
 
 /// Returns the number of pairs of `count` vehicles.

@@ -38,7 +38,8 @@ pub use crate::link::{
 pub use crate::shield::ShieldSpec;
 pub(crate) use document::is_default;
 pub use environment::IgnoredPart;
-pub use error::{ErrorKind, Field, ScenarioError, edit_distance};
+pub(crate) use error::entry_key;
+pub use error::{ErrorKind, ScenarioError, edit_distance};
 pub use external::ExternalLaw;
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,

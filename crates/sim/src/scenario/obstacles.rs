@@ -25,7 +25,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::error::{ErrorKind, ScenarioError};
+use super::error::{ErrorKind, ScenarioError, entry_key, leg_key};
 use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, SMALLEST};
 use super::spec::Scenario;
 use tautline_audit::MovingObstacle;
@@ -151,9 +151,8 @@ impl ObstacleTable {
 
     /// Returns the obstacle at rest, with a default clearance \[m\].
     pub(super) fn obstacle(&self, number: usize, clearance_m: f64) -> Result<Obstacle, ScenarioError> {
-        let wrong = |problem: String, help: &str| {
-            ScenarioError::new(ErrorKind::Obstacle, problem, help).at_entry("obstacle", number)
-        };
+        let wrong =
+            |problem: String, help: &str| ErrorKind::Obstacle.at(&[&entry_key("obstacle", number)], problem, help);
         let MovingObstacle { name, shape, clearance_m: own_m, path } =
             self.clone().into_moving().map_err(|problem| wrong(problem, OBSTACLE_HELP))?;
         let [(_, place_m)] = path[..] else {
@@ -194,19 +193,18 @@ impl Scenario {
     /// clearance.
     pub(super) fn check_obstacles(&self) -> Result<(), ScenarioError> {
         for (number, obstacle) in self.obstacles.iter().enumerate() {
-            check_solid(obstacle).map_err(|error| error.at_entry("obstacle", number))?;
+            check_solid(obstacle, &entry_key("obstacle", number))?;
             if self.obstacles[..number].iter().any(|before| before.name == obstacle.name) {
                 let problem = format!("two obstacles have the name `{}`", obstacle.name);
                 let help = "give each obstacle its own name";
-                return Err(ScenarioError::new(ErrorKind::Name, problem, help).at_entry("obstacle", number));
+                return Err(ErrorKind::Name.at(&[&entry_key("obstacle", number)], problem, help));
             }
             self.check_hulls_beside(number, obstacle)?;
         }
         if let Some((_, vehicle, number)) = self.too_near(&self.start.positions_m, 0.0) {
-            return Err(self
-                .refuse(row(&self.start.positions_m, vehicle), number, format_args!("vehicle {} starts", vehicle + 1))
-                .at_entry("start.positions_m", vehicle)
-                .at_entry("obstacle", number));
+            let key = entry_key("start.positions_m", vehicle);
+            let point_m = row(&self.start.positions_m, vehicle);
+            return Err(self.refuse(&key, point_m, number, &format!("vehicle {} starts", vehicle + 1)));
         }
         self.check_slots_beside_obstacles()
     }
@@ -224,14 +222,9 @@ impl Scenario {
             });
             if let Some((_, vehicle, number)) = self.too_near(&slots_m, SLOT_MARGIN * self.delta_m) {
                 let of_leg = if leg == 0 { String::new() } else { format!(" of leg {}", leg + 1) };
-                return Err(self
-                    .refuse(
-                        row(&slots_m, vehicle),
-                        number,
-                        format_args!("the slot of vehicle {}{of_leg} is", vehicle + 1),
-                    )
-                    .at_leg_entry(leg, "formation.points_m", vehicle)
-                    .at_entry("obstacle", number));
+                let key = entry_key(&leg_key(leg, "points_m"), vehicle);
+                let subject = format!("the slot of vehicle {}{of_leg} is", vehicle + 1);
+                return Err(self.refuse(&key, row(&slots_m, vehicle), number, &subject));
             }
         }
         Ok(())
@@ -244,7 +237,8 @@ impl Scenario {
             .filter(|&(clearance_margin_m, ..)| clearance_margin_m <= margin_m)
     }
 
-    fn refuse(&self, point_m: Vector3<f64>, number: usize, subject: std::fmt::Arguments<'_>) -> ScenarioError {
+    /// Returns an error about a point at a key within the clearance of an obstacle.
+    fn refuse(&self, key: &str, point_m: Vector3<f64>, number: usize, subject: &str) -> ScenarioError {
         let Obstacle { name, clearance_m, shape, place_m } = &self.obstacles[number];
         let (distance_m, _) = signed_distance_m(shape, point_m - place_m);
         let said = if distance_m <= 0.0 {
@@ -254,7 +248,7 @@ impl Scenario {
             format!("{subject} {distance} m from obstacle `{name}`, not more than its clearance of {clearance_m} m")
         };
         let help = "move one of them away, or reduce the clearance_m of the obstacle";
-        ScenarioError::new(ErrorKind::NearObstacle, said, help)
+        ErrorKind::NearObstacle.at(&[key, &entry_key("obstacle", number)], said, help)
     }
 
     fn check_hulls_beside(&self, number: usize, obstacle: &Obstacle) -> Result<(), ScenarioError> {
@@ -271,27 +265,29 @@ impl Scenario {
             obstacle.clearance_m
         );
         let help = "enlarge the clearance_m of the obstacle, or reduce swarm.hull_radius_m";
-        Err(ScenarioError::new(ErrorKind::HullsTouch, problem, help)
-            .at_entry("obstacle", number)
-            .at_entry("swarm.hull_radius_m", vehicle))
+        Err(ErrorKind::HullsTouch.at(
+            &[&entry_key("obstacle", number), &entry_key("swarm.hull_radius_m", vehicle)],
+            problem,
+            help,
+        ))
     }
 }
 
 /// Refuses an empty name, a name that is a number (as of a vehicle), and a normal of length 0.
-fn check_solid(obstacle: &Obstacle) -> Result<(), ScenarioError> {
+fn check_solid(obstacle: &Obstacle, key: &str) -> Result<(), ScenarioError> {
     let Obstacle { name, shape, .. } = obstacle;
     if name.trim().is_empty() {
-        return Err(ScenarioError::new(ErrorKind::Name, "the name of an obstacle is empty", "name the obstacle"));
+        return Err(ErrorKind::Name.at(&[key], "the name of an obstacle is empty", "name the obstacle"));
     }
     if name.trim().parse::<u64>().is_ok() {
         let problem = format!("the name of an obstacle must not be a number, got `{name}`");
-        return Err(ScenarioError::new(ErrorKind::Name, problem, "add a letter: numbers are names of vehicles"));
+        return Err(ErrorKind::Name.at(&[key], problem, "add a letter: numbers are names of vehicles"));
     }
     match shape {
         Shape::HalfSpace { normal } if normal.norm() < SMALLEST => {
             let problem = format!("the normal of obstacle `{name}` has the length {}", normal.norm());
             let help = "give the direction that points out of the half-space, such as [0, 0, 1]";
-            Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help))
+            Err(ErrorKind::OutOfRange.at(&[key], problem, help))
         }
         _ => Ok(()),
     }

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::{All, Point, Vehicles};
-use super::error::{ErrorKind, ScenarioError};
+use super::error::{ErrorKind, ScenarioError, entry_key};
 use super::limits::SMALLEST;
 use tautline_laws::graph::Pinning;
 use tautline_laws::target::{Guidance, ReferenceMotion, Spline};
@@ -136,16 +136,15 @@ impl ReferenceTable {
             let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
             index.filter(|&index| index < count).ok_or_else(|| {
                 let problem = format!("the vehicle must be from 1 to {count}, got {number}");
-                ScenarioError::new(ErrorKind::UnknownVehicle, problem, "vehicles are counted from 1").at(key)
+                ErrorKind::UnknownVehicle.at(&[key], problem, "vehicles are counted from 1")
             })
         };
         match (&self.known_by, self.leader) {
-            (Some(_), Some(_)) => Err(ScenarioError::new(
-                ErrorKind::ExclusiveKeys,
+            (Some(_), Some(_)) => Err(ErrorKind::ExclusiveKeys.at(
+                &["reference.leader", "reference.known_by"],
                 "both `known_by` and `leader` are given",
                 "keep one of them: only the leader knows its reference",
-            )
-            .at_keys(["reference.leader", "reference.known_by"])),
+            )),
             (None, Some(leader)) => Ok(Pinning::Leader(index(leader, "reference.leader")?)),
             (None | Some(Vehicles::All(All::All)), None) => Ok(Pinning::All),
             (Some(Vehicles::Listed(listed)), None) => {
@@ -156,7 +155,7 @@ impl ReferenceTable {
                 if listed.is_empty() {
                     let problem = "no vehicle knows the reference";
                     let help = "list at least one vehicle, or leave out `known_by`: then all vehicles know it";
-                    return Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help).at("reference.known_by"));
+                    return Err(ErrorKind::Inconsistent.at(&["reference.known_by"], problem, help));
                 }
                 Ok(if listed.len() == count { Pinning::All } else { Pinning::Listed(listed) })
             }
@@ -181,7 +180,7 @@ impl ReferenceKind {
                 if period_s.abs() < SMALLEST {
                     let message = format!("the period must be at least {SMALLEST:e} s in magnitude, got {period_s} s");
                     let help = "give a longer period; a negative one turns clockwise";
-                    return Err(ScenarioError::new(ErrorKind::OutOfRange, message, help).at("reference.period_s"));
+                    return Err(ErrorKind::OutOfRange.at(&["reference.period_s"], message, help));
                 }
                 ReferenceMotion::Circle { centre_m: centre_m.coordinates().into(), radius_m, period_s }
             }
@@ -197,11 +196,11 @@ impl ReferenceKind {
                     _ => {
                         let problem = "way points need either `times_s` or `speed_m_s`";
                         let help = "give the time at each point, or the largest speed between them";
-                        return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at_keys([
-                            "reference.times_s",
-                            "reference.speed_m_s",
-                            "reference.points_m",
-                        ]));
+                        return Err(ErrorKind::MissingKey.at(
+                            &["reference.times_s", "reference.speed_m_s", "reference.points_m"],
+                            problem,
+                            help,
+                        ));
                     }
                 };
                 ReferenceMotion::WayPoints { points: in_time(&points_m, &times_s)? }
@@ -212,8 +211,11 @@ impl ReferenceKind {
                 check_steady(&points)?;
                 let spline = Spline::through(&points).ok_or_else(|| {
                     let problem = "no curve goes through the points";
-                    ScenarioError::new(ErrorKind::Reference, problem, "give finite points, and times that increase")
-                        .at("reference.points_m")
+                    ErrorKind::Reference.at(
+                        &["reference.points_m"],
+                        problem,
+                        "give finite points, and times that increase",
+                    )
                 })?;
                 ReferenceMotion::Table(spline)
             }
@@ -226,7 +228,7 @@ fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
     if points_m.is_empty() {
         let problem = "the reference has no points";
         let help = "give points_m = [[x, y], ...]";
-        return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at("reference.points_m"));
+        return Err(ErrorKind::MissingKey.at(&["reference.points_m"], problem, help));
     }
     Ok(points_m.iter().map(|point| point.coordinates().into()).collect())
 }
@@ -248,8 +250,7 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
     if points_m.len() != times_s.len() {
         let problem = format!("{} points and {} times", points_m.len(), times_s.len());
         let help = "give a time for each point";
-        return Err(ScenarioError::new(ErrorKind::CountMismatch, problem, help)
-            .at_keys(["reference.times_s", "reference.points_m"]));
+        return Err(ErrorKind::CountMismatch.at(&["reference.times_s", "reference.points_m"], problem, help));
     }
     for (k, &time_s) in times_s.iter().enumerate() {
         if k > 0 && time_s <= times_s[k - 1] {
@@ -260,7 +261,7 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
                 format!("time {} of the reference must be more than {before_s} s, got {time_s} s", k + 1)
             };
             let help = "times must increase; for a jump of the formation use a [[leg]]";
-            return Err(ScenarioError::new(ErrorKind::Reference, said, help).at_entry("reference.times_s", k));
+            return Err(ErrorKind::Reference.at(&[&entry_key("reference.times_s", k)], said, help));
         }
     }
     Ok(times_s.iter().copied().zip(points_m.iter().copied()).collect())
@@ -273,8 +274,7 @@ fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), Sce
         let problem =
             format!("the reference must cover the flight from 0 to {duration_s} s, got {} to {} s", first.0, last.0);
         let help = "give points from time 0 to the end of the flight, or shorten time.duration_s";
-        return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
-            .at_keys(["reference.times_s", "time.duration_s"]));
+        return Err(ErrorKind::OutsideFlight.at(&["reference.times_s", "time.duration_s"], problem, help));
     }
     Ok(())
 }
@@ -297,7 +297,7 @@ fn check_steady(points: &[(f64, Vector3<f64>)]) -> Result<(), ScenarioError> {
         speeds_m_s[k]
     );
     let help = "add points in between, or set reference.kind to \"way-points\", which rests at each point";
-    Err(ScenarioError::new(ErrorKind::Reference, problem, help).at_entry("reference.points_m", k + 1))
+    Err(ErrorKind::Reference.at(&[&entry_key("reference.points_m", k + 1)], problem, help))
 }
 
 impl From<&Guidance> for ReferenceTable {

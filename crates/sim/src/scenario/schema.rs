@@ -12,8 +12,10 @@ use serde_json::{Value, json};
 use toml::Spanned;
 use toml::de::DeValue;
 
+use super::check::Check;
 use super::document::Document;
 use super::error::ScenarioError;
+use tautline_core::failure::Place;
 
 /// Tables with their default kind.
 const DEFAULT_KINDS: [(&str, &str); 3] =
@@ -82,16 +84,19 @@ impl TomlSchema {
         Self(schema)
     }
 
-    /// Checks keys, types, words and bounds of a value. `key` is its name in messages.
+    /// Checks keys, types, words and bounds of a value. `key` is its name in messages, `locate` returns the place of a
+    /// span.
     ///
     /// # Errors
-    /// The first error, without a place, and the offending bytes.
+    /// The first error.
     pub fn check(
         &'static self,
         key: &str,
         value: &mut Spanned<DeValue<'_>>,
-    ) -> Result<(), (ScenarioError, Range<usize>)> {
-        super::check::check_value(key, value, Node::of_file(&self.0)).map_err(|found| (found.error, found.span))
+        locate: &dyn Fn(Range<usize>) -> Place,
+    ) -> Result<(), ScenarioError> {
+        let file = Node::of_file(&self.0);
+        Check { file, overridden_from: usize::MAX, locate: &|span| Some(locate(span)) }.value(value, file, key, None)
     }
 }
 
@@ -114,11 +119,6 @@ impl Node {
     /// Returns the part for the whole file that a schema describes.
     fn of_file(file: &'static Value) -> Self {
         Self { file, schema: file, description: None }.resolve(file)
-    }
-
-    /// Returns the part for the same file.
-    pub(super) fn whole_file(self) -> Self {
-        Self::of_file(self.file)
     }
 
     /// Returns the part that a reference points to. The description of the key precedes the description of its type.

@@ -121,7 +121,7 @@ pub(super) fn finish(
 ) -> Result<Scenario, ScenarioError> {
     let stem = || Path::new(text.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     document.name = document.name.or_else(|| Some(as_name(&stem())));
-    template::check_laws(&document.laws).map_err(|(law, error)| text.place_in_law(law, error))?;
+    template::check_laws(&document.laws).map_err(|error| text.place(error))?;
     let jitter_m = document.start.jitter_m;
     let scenario = build::scenario(document).map_err(|error| text.place(error))?;
     scenario.check_built(valid).map_err(|error| text.place(error.with_jitter(jitter_m)))?;
@@ -160,7 +160,7 @@ fn unknown_builtin(name: &str) -> ScenarioError {
     let is_file = Path::new(&file).is_file();
     let problem = format!("`{name}` is neither a built-in scenario nor a file");
     let help = if is_file { format!("did you mean the file `{file}`?") } else { suggest(name, &names) };
-    ScenarioError::new(ErrorKind::NotFound, problem, help)
+    ErrorKind::NotFound.at(&[], problem, help)
 }
 
 /// Replaces characters that a name may not contain by `-`.
@@ -173,7 +173,7 @@ fn read_file(path: &Path) -> Result<String, ScenarioError> {
     let shown = path.display().to_string();
     if path.is_dir() {
         let problem = format!("{shown} is a directory");
-        return Err(ScenarioError::new(ErrorKind::CannotRead, problem, "give the path of a scenario file within it"));
+        return Err(ErrorKind::CannotRead.at(&[], problem, "give the path of a scenario file within it"));
     }
     read(&shown, File::open(path).map_err(|error| unreadable(&shown, &error))?)
 }
@@ -182,7 +182,7 @@ fn unreadable(shown: &str, error: &std::io::Error) -> ScenarioError {
     let is_missing = error.kind() == std::io::ErrorKind::NotFound;
     let problem = format!("cannot read {shown}: {error}");
     let help = "give the path of a scenario file, or the name of a built-in scenario such as `pentagon`";
-    ScenarioError::new(if is_missing { ErrorKind::NotFound } else { ErrorKind::CannotRead }, problem, help)
+    if is_missing { ErrorKind::NotFound } else { ErrorKind::CannotRead }.at(&[], problem, help)
 }
 
 /// Reads a source to its end, as UTF-8 of at most [`MAX_FILE_BYTES`]; `shown` is its name in messages.
@@ -192,7 +192,7 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
     source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(shown, &error))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let problem = format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20);
-        return Err(ScenarioError::new(ErrorKind::TooLarge, problem, "name a smaller file"));
+        return Err(ErrorKind::TooLarge.at(&[], problem, "name a smaller file"));
     }
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
@@ -200,7 +200,7 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
         let text = String::from_utf8_lossy(&bytes[..bytes.len().min(valid + 64)]);
         let problem = format!("byte {valid} (from 0) is not UTF-8");
         let help = "save the file as UTF-8 text";
-        ScenarioError::new(ErrorKind::NotUtf8, problem, help).with_place(Place::new(
+        ErrorKind::NotUtf8.at(&[], problem, help).with_place(Place::new(
             shown,
             &text,
             valid..valid + '\u{fffd}'.len_utf8(),

@@ -36,8 +36,7 @@ pub(super) fn positions(
                 let problem =
                     format!("the smallest separation must be more than delta = {delta_m} m, got {min_separation_m} m");
                 let help = "enlarge start.min_separation_m or reduce law.delta_m";
-                return Err(ScenarioError::new(ErrorKind::WithinDelta, problem, help)
-                    .at_keys(["start.min_separation_m", "law.delta_m"]));
+                return Err(ErrorKind::WithinDelta.at(&["start.min_separation_m", "law.delta_m"], problem, help));
             }
             return scatter(count, space, half_extent_m, min_separation_m, random);
         }
@@ -88,11 +87,11 @@ pub fn scatter(
                 i + 1
             );
             let help = "enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles";
-            return Err(ScenarioError::new(ErrorKind::NoRoom, problem, help).at_keys([
-                "start.half_extent_m",
-                "start.min_separation_m",
-                "swarm.count",
-            ]));
+            return Err(ErrorKind::NoRoom.at(
+                &["start.half_extent_m", "start.min_separation_m", "swarm.count"],
+                problem,
+                help,
+            ));
         };
         set_row(&mut positions_m, i, position);
     }

@@ -164,7 +164,7 @@ impl Template {
             } else {
                 format!("no law has the name `{name}`")
             };
-            return Err(ScenarioError::new(ErrorKind::UnknownChoice, problem, help));
+            return Err(ErrorKind::UnknownChoice.at(&[], problem, help));
         };
         let law = law.complete(self.own.velocity_coefficient_per_s());
         Ok(NamedLaw { name: name.to_owned(), law, shield: None })
@@ -228,17 +228,16 @@ fn keys(law: &LawSpec) -> (String, Table) {
     })
 }
 
-/// Checks all laws of a file; an error comes with the name of its law.
-pub(super) fn check_laws(laws: &Laws) -> Result<(), (&str, ScenarioError)> {
+/// Checks all laws of a file.
+pub(super) fn check_laws(laws: &Laws) -> Result<(), ScenarioError> {
     let kinds: Vec<_> = LawSpec::all().iter().map(kind).collect();
     for (name, OtherLaw { kind: law }) in laws {
-        check_name(name).map_err(|error| (&**name, error))?;
+        check_name(name)?;
         let kind = kind(law);
         if *name != kind && kinds.contains(name) {
             let problem = format!("the law {name} has the name of a kind, but is of the kind {kind}");
             let help = "give it a name that is not a kind of law";
-            let error = ScenarioError::new(ErrorKind::Name, problem, help).at("law.kind");
-            return Err((name, error));
+            return Err(ErrorKind::Name.at(&[&format!("laws.{name}.kind")], problem, help));
         }
     }
     Ok(())
@@ -252,5 +251,5 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         None if name.len() > MAX_NAME_CHARS => format!("the name of a law has {} characters", name.len()),
         None => return Ok(()),
     };
-    Err(ScenarioError::new(ErrorKind::Name, said, help))
+    Err(ErrorKind::Name.at(&[&format!("laws.{name}")], said, help))
 }

@@ -10,9 +10,10 @@ use serde::Deserialize as _;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 use toml::{Spanned, map::Map};
 
-use super::check::check_schema;
+use super::check::Check;
 use super::document::{Document, TimeKeys};
-use super::error::{ErrorKind, Field, ScenarioError};
+use super::error::{ErrorKind, ScenarioError};
+use super::schema::Node;
 use tautline_core::failure::Place;
 use tautline_core::option::SET;
 
@@ -78,24 +79,20 @@ impl<'a> Text<'a> {
         if root.get_ref().as_table().is_some_and(Map::is_empty) {
             let problem = "the scenario is empty";
             let help = "start from a built-in scenario, such as `pentagon`";
-            return Err(ScenarioError::new(ErrorKind::Empty, problem, help).with_place(Place::new(
-                self.name,
-                self.toml,
-                0..0,
-            )));
+            return Err(ErrorKind::Empty.at(&[], problem, help).with_place(self.locate(0..0)));
         }
         let time = root.get_ref().get("time");
         let gives = |key: &str| time.is_some_and(|time| time.get_ref().get(key).is_some());
         let given =
             TimeKeys { dt_s: gives("dt_s"), record_hz: gives("record_hz"), max_halvings: gives("max_halvings") };
-        check_schema(&mut root, self.toml.len() + 1)
-            .map_err(|schema_error| schema_error.error.with_place(self.locate(schema_error.span)))?;
-        // `check_schema` accepts only what serde reads. An error of serde is a defect of the schema.
+        let locate = |span| Some(self.locate(span));
+        let check = Check { file: Node::root(), overridden_from: self.toml.len() + 1, locate: &locate };
+        check.nest(&mut root)?;
+        // The check accepts only what serde reads. An error of serde is a defect of the schema.
         let document = Document::deserialize(ValueDeserializer::from(root)).map_err(|error| {
             let problem = error.message();
             let help = "`tautline schema` describes every key";
-            ScenarioError::new(ErrorKind::WrongType, problem, help)
-                .with_place(self.locate(error.span().unwrap_or(0..0)))
+            ErrorKind::WrongType.at(&[], problem, help).with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
         Ok(Document { given, ..document })
     }
@@ -103,7 +100,7 @@ impl<'a> Text<'a> {
     /// Adds the place in the text to an error about keys: the first key that an override sets, or else the first key.
     pub(super) fn place(&self, error: ScenarioError) -> ScenarioError {
         let (None, Ok(root)) = (&error.place, self.tree()) else { return error };
-        let spans = error.fields.iter().map(|field| find(&root, field, self.toml.len() + 1));
+        let spans = error.keys.iter().map(|key| find(&root, key, self.toml.len() + 1));
         let overridden = spans.clone().find(|span| span.start > self.toml.len());
         // A key that is not in the text has no span.
         let written = || spans.clone().find(|span| !span.is_empty());
@@ -116,22 +113,12 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// Adds the place to an error about a law of `[laws.NAME]`: its key, or else its table.
-    pub(super) fn place_in_law(&self, law: &str, error: ScenarioError) -> ScenarioError {
-        let Ok(root) = self.tree() else { return error };
-        let Some((name, keys)) = laws(&root).and_then(|laws| laws.get_key_value(law)) else { return error };
-        let field = error.fields.first();
-        let key = field.map_or("", |field| field.key.trim_start_matches("law."));
-        let span = keys.get_ref().get(key).map_or_else(|| name.span(), Spanned::span);
-        error.with_place(self.locate(span))
-    }
-
     /// Returns the text as a tree with its overrides applied.
     pub(super) fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
             let problem = format!("the text is not TOML: {}", error.message());
             let help = "a scenario is `key = value` lines below `[table]` headers";
-            ScenarioError::new(ErrorKind::Syntax, problem, help).with_place(self.locate(error.span().unwrap_or(0..0)))
+            ErrorKind::Syntax.at(&[], problem, help).with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
         let mut root = Spanned::new(0..0, DeValue::Table(parsed.into_inner()));
         let mut base = self.toml.len() + 1;
@@ -158,30 +145,52 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Returns the tables `[laws.NAME]`.
-fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
-    root.get_ref().get("laws")?.get_ref().as_table()
+/// Returns the span of the value of a key or entry. A missing key has the span of its origin, or else of its table. An
+/// overridden part, with a span from `overridden` on, replaces the whole.
+fn find(root: &Spanned<DeValue<'_>>, path: &str, overridden: usize) -> Range<usize> {
+    let list = path.rsplit_once('.').filter(|(_, entry)| entry.parse::<usize>().is_ok()).map_or(path, |(list, _)| list);
+    // Keys of a leg have the origins of those of `[formation]`.
+    let leg = list.strip_prefix("leg.").and_then(|rest| rest.split_once('.'));
+    let key = leg.map_or_else(|| Cow::Borrowed(list), |(_, key)| Cow::Owned(format!("formation.{key}")));
+    let origins = ORIGINS.iter().filter(|(missing, _)| **missing == *key).flat_map(|(_, origins)| origins.iter());
+    let origins = origins.map(|origin| match leg {
+        Some((leg, _)) => origin.replace("formation", &format!("leg.{leg}")),
+        None => (*origin).to_owned(),
+    });
+    let mut found = [path, list].map(str::to_owned).into_iter().chain(origins).map(|path| value_at(root, &path));
+    match found.find_map(|(value, key)| Some((value?, key))) {
+        Some((value, key)) => {
+            let span = if value.get_ref().is_table() { key } else { value.span() };
+            first_span_from(value, overridden).unwrap_or(span)
+        }
+        None => value_at(root, list).1,
+    }
 }
 
-/// Returns the span of the value of a field, or of its entry in a list. A missing key has the span of its origin, or
-/// else of its table. An overridden part, with a span from `overridden` on, replaces the whole.
-fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<usize> {
-    let of_leg = field.leg.checked_sub(1).and_then(|leg| root.get_ref().get("leg")?.get_ref().get(leg));
-    let value_at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
-        (Some(leg), Some(key)) => leg.get_ref().get(key),
-        _ => path.split('.').try_fold(root, |value, key| value.get_ref().get(key)),
-    };
-    let origins = ORIGINS.iter().find(|(key, _)| *key == field.key).map_or(&[][..], |(_, origins)| origins);
-    let Some(value) = std::iter::once(&*field.key).chain(origins.iter().copied()).find_map(value_at) else {
-        if let Some(leg) = of_leg {
-            return leg.span();
-        }
-        let table = field.key.split('.').next().unwrap_or_default();
-        let tables = root.get_ref().as_table();
-        return tables.and_then(|tables| tables.get_key_value(table)).map_or(0..0, |(key, _)| key.span());
-    };
-    let value = field.entry.and_then(|entry| value.get_ref().get(entry)).unwrap_or(value);
-    first_span_from(value, overridden).unwrap_or_else(|| value.span())
+/// Returns the value of a key or entry, and the span of the last key or entry on the way to it.
+fn value_at<'t, 'a>(root: &'t Spanned<DeValue<'a>>, path: &str) -> (Option<&'t Spanned<DeValue<'a>>>, Range<usize>) {
+    /// Returns the rest of a path after its first part; `None` if it begins with another one.
+    fn after<'p>(path: &'p str, part: &str) -> Option<&'p str> {
+        let rest = path.strip_prefix(part)?;
+        if rest.is_empty() { Some(rest) } else { rest.strip_prefix('.') }
+    }
+    let (mut value, mut rest, mut span) = (root, path, 0..0);
+    while !rest.is_empty() {
+        let next = match value.get_ref() {
+            // The name of a law may have dots.
+            DeValue::Table(table) => {
+                table.iter().find_map(|(key, value)| Some((key.span(), value, after(rest, key.get_ref())?)))
+            }
+            DeValue::Array(list) => list
+                .iter()
+                .zip(1..)
+                .find_map(|(value, number): (_, usize)| Some((value.span(), value, after(rest, &number.to_string())?))),
+            _ => None,
+        };
+        let Some(next) = next else { return (None, span) };
+        (span, value, rest) = next;
+    }
+    (Some(value), span)
 }
 
 /// Returns the span of the value, or of the first part of a list, that starts at `least` or later.
@@ -220,7 +229,7 @@ impl Override {
         let Some(equals) = text.find('=') else {
             let problem = "an override has no `=`";
             let help = "write it as key.path=value, for example time.dt_s=0.001";
-            return Err(ScenarioError::new(ErrorKind::Override, problem, help).with_place(place(0..text.len())));
+            return Err(ErrorKind::Override.at(&[], problem, help).with_place(place(0..text.len())));
         };
         let mut path = Vec::new();
         let mut start = 0;
@@ -229,9 +238,7 @@ impl Override {
             if key.is_empty() || !text[key.clone()].chars().all(is_word) {
                 let problem = format!("`{part}` is not a key of an override");
                 let help = "a path is keys and entry numbers with dots between them, such as start.positions_m.2.x";
-                return Err(
-                    ScenarioError::new(ErrorKind::Override, problem, help).with_place(place(start..start + part.len()))
-                );
+                return Err(ErrorKind::Override.at(&[], problem, help).with_place(place(start..start + part.len())));
             }
             path.push(key);
             start += part.len() + 1;
@@ -239,7 +246,7 @@ impl Override {
         if path.len() > MAX_DEPTH {
             let problem = format!("a path must have at most {MAX_DEPTH} parts, got {}", path.len());
             let help = "`tautline schema` lists the keys of a scenario";
-            return Err(ScenarioError::new(ErrorKind::Override, problem, help).with_place(place(0..equals)));
+            return Err(ErrorKind::Override.at(&[], problem, help).with_place(place(0..equals)));
         }
         let value = trimmed(text, equals + 1..text.len());
         let parsed = Self { text: text.to_owned(), path, value };
@@ -250,7 +257,7 @@ impl Override {
                 let span = error.span().map_or(parsed.value.clone(), |span| base + span.start..base + span.end);
                 let problem = format!("the value is not TOML: {}", error.message());
                 let help = "numbers, true, false, [lists], {tables} and \"strings\" are; a bare word is a string";
-                Err(ScenarioError::new(ErrorKind::Override, problem, help).with_place(place(span)))
+                Err(ErrorKind::Override.at(&[], problem, help).with_place(place(span)))
             }
         }
     }
@@ -319,7 +326,7 @@ impl Override {
 
     fn refuse(&self, span: &Range<usize>, message: &str) -> ScenarioError {
         let help = "entries of lists are counted from 1, as vehicles are; x, y, z name the axes of a point";
-        ScenarioError::new(ErrorKind::Override, message, help).with_place(self.place(span.clone()))
+        ErrorKind::Override.at(&[], message, help).with_place(self.place(span.clone()))
     }
 }
 

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::check::{SchemaError, check_written};
+use super::check::{check_written, of_filled_value};
 use super::document::Document;
-use super::error::{ErrorKind, ScenarioError};
+use super::error::{ErrorKind, ScenarioError, entry_key, leg_key};
 use super::limits::{
     CONTACT_PREDICTION_M, LARGEST, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
     first_pair_within, is_name_character,
@@ -47,7 +47,7 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.check_noise()?;
         self.check_lengths()?;
-        self.check_keys().map_err(SchemaError::without_text)?;
+        self.check_keys()?;
         self.check()
     }
 
@@ -60,11 +60,11 @@ impl Scenario {
             i64::try_from(noise_seed).is_ok()
                 && *self == Self { start, legs, external_law, noise_seed, ..valid.clone() }
         });
-        if has_valid_keys { Ok(()) } else { self.check_keys().map_err(SchemaError::of_filled_value) }
+        if has_valid_keys { Ok(()) } else { self.check_keys().map_err(of_filled_value) }
     }
 
     /// Checks single keys as the reader of a recording does. [`Scenario::check`] checks all limits of points and edges.
-    fn check_keys(&self) -> Result<(), SchemaError> {
+    fn check_keys(&self) -> Result<(), ScenarioError> {
         check_written(&Document::from(self).without_lists().toml())
     }
 
@@ -105,18 +105,15 @@ impl Scenario {
             SimError::Obstacle(ObstacleError { name, .. }) => {
                 let problem = error.to_string();
                 let help = "correct the shape, the position or the clearance_m of the obstacle";
-                let found = ScenarioError::new(ErrorKind::Obstacle, problem, help);
-                match self.obstacles.iter().position(|obstacle| obstacle.name == *name) {
-                    Some(number) => found.at_entry("obstacle", number),
-                    None => found.at("obstacle"),
-                }
+                let number = self.obstacles.iter().position(|obstacle| obstacle.name == *name);
+                let key = number.map_or_else(|| "obstacle".to_owned(), |number| entry_key("obstacle", number));
+                ErrorKind::Obstacle.at(&[&key], problem, help)
             }
-            _ => ScenarioError::new(
-                ErrorKind::OutOfRange,
+            _ => ErrorKind::OutOfRange.at(
+                &["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"],
                 error.to_string(),
                 "choose a safety distance and a number of vehicles that can be judged",
-            )
-            .at_keys(["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"]),
+            ),
         }
     }
 
@@ -126,7 +123,7 @@ impl Scenario {
         }
         let problem = format!("noise.seed is too large for a scenario file, got {}", self.noise_seed);
         let help = format!("give a seed of at most {}", i64::MAX);
-        Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help).at("noise.seed"))
+        Err(ErrorKind::OutOfRange.at(&["noise.seed"], problem, help))
     }
 
     fn check_arrival(&self) -> Result<(), ScenarioError> {
@@ -137,8 +134,7 @@ impl Scenario {
                 arrival.hold_s, time.duration_s
             );
             let help = "enlarge time.duration_s or reduce arrival.hold_s";
-            return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
-                .at_keys(["arrival.hold_s", "time.duration_s"]));
+            return Err(ErrorKind::OutsideFlight.at(&["arrival.hold_s", "time.duration_s"], problem, help));
         }
         Ok(())
     }
@@ -146,7 +142,7 @@ impl Scenario {
     fn check_legs(&self) -> Result<(), ScenarioError> {
         if self.legs.is_empty() {
             let problem = "the scenario has no formation";
-            return Err(ScenarioError::new(ErrorKind::MissingKey, problem, "give one").at("formation"));
+            return Err(ErrorKind::MissingKey.at(&["formation"], problem, "give one"));
         }
         let mut from_s = 0.0;
         for (number, leg) in self.legs.iter().enumerate().skip(1) {
@@ -154,9 +150,7 @@ impl Scenario {
             if slots != self.count() {
                 let problem = format!("leg {} has {slots} slots for {} vehicles", number + 1, self.count());
                 let help = "every leg needs a slot for each vehicle";
-                return Err(
-                    ScenarioError::new(ErrorKind::CountMismatch, problem, help).at_leg(number, "formation.points_m")
-                );
+                return Err(ErrorKind::CountMismatch.at(&[&leg_key(number, "points_m")], problem, help));
             }
             let LegTrigger::At(start_s) = leg.begins else { continue };
             if !(start_s >= from_s && start_s < self.time.duration_s) {
@@ -165,9 +159,11 @@ impl Scenario {
                     "legs must begin in order, at {from_s} s or later and before the end of the flight at {} s",
                     self.time.duration_s
                 );
-                return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
-                    .at_leg(number, "formation.start_s")
-                    .at("time.duration_s"));
+                return Err(ErrorKind::OutsideFlight.at(
+                    &[&leg_key(number, "start_s"), "time.duration_s"],
+                    problem,
+                    help,
+                ));
             }
             from_s = start_s;
         }
@@ -187,16 +183,12 @@ impl Scenario {
                 self.time.dt_s
             );
             let help = format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s");
-            return Err(
-                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["reference.kind", "time.dt_s"])
-            );
+            return Err(ErrorKind::StepTooLong.at(&["reference.kind", "time.dt_s"], problem, help));
         }
         if self.space == Space::Plane && !guidance.motion.is_level() {
             let problem = "the reference leaves the plane z = 0 of the swarm";
             let help = "set its z to 0, or swarm.dimensions to 3";
-            return Err(
-                ScenarioError::new(ErrorKind::Plane, problem, help).at_keys(["reference.kind", "swarm.dimensions"])
-            );
+            return Err(ErrorKind::Plane.at(&["reference.kind", "swarm.dimensions"], problem, help));
         }
         let Some(leader) = guidance.known_by.leader() else { return Ok(()) };
         let off_m_s = row(&self.start.velocities_m_s, leader) - start.velocity_m_s;
@@ -217,15 +209,13 @@ impl Scenario {
             metres(off_m_s.norm())
         );
         let help = "leave out its start velocity: the default is that of the reference";
-        Err(ScenarioError::new(ErrorKind::Reference, problem, help)
-            .at_entry("start.velocities_m_s", leader)
-            .at("reference.leader"))
+        Err(ErrorKind::Reference.at(&[&entry_key("start.velocities_m_s", leader), "reference.leader"], problem, help))
     }
 
     /// Checks that the law follows a reference that these vehicles know.
     fn check_followed(&self, guidance: &Guidance) -> Result<(), ScenarioError> {
         let refuse = |said: String, help: &str, key: &'static str| {
-            Err(ScenarioError::new(ErrorKind::UnsupportedByLaw, said, help).at(key).at("law.kind"))
+            Err(ErrorKind::UnsupportedByLaw.at(&[key, "law.kind"], said, help))
         };
         match self.law() {
             Ok(law) if law.capabilities().controls != Controls::Places => {
@@ -270,25 +260,23 @@ impl Scenario {
 
     fn check_motion(&self) -> Result<(), ScenarioError> {
         let start = [
-            ("start.positions_m", "the start position", &self.start.positions_m),
-            ("start.velocities_m_s", "the start velocity", &self.start.velocities_m_s),
+            ("start.positions_m".to_owned(), "the start position", &self.start.positions_m),
+            ("start.velocities_m_s".to_owned(), "the start velocity", &self.start.velocities_m_s),
         ];
-        let slots = self.legs.iter().map(|leg| ("formation.points_m", "the slot", &leg.formation.slots_m));
-        let slots = slots.enumerate();
-        for (leg, (key, what, rows)) in start.into_iter().map(|rows| (0, rows)).chain(slots) {
+        let slots = self.legs.iter().enumerate();
+        let slots = slots.map(|(number, leg)| (leg_key(number, "points_m"), "the slot", &leg.formation.slots_m));
+        for (key, what, rows) in start.into_iter().chain(slots) {
             for i in 0..rows.nrows() {
                 for axis in 0..3 {
                     let name = ["x", "y", "z"][axis];
                     check_size(&format!("{name} of {what} of vehicle {}", i + 1), rows[(i, axis)])
-                        .map_err(|error| error.at_leg_entry(leg, key, i))?;
+                        .map_err(|error| error.at(&[&entry_key(&key, i)]))?;
                 }
                 if self.space == Space::Plane && rows[(i, 2)] != 0.0 {
                     let z = rows[(i, 2)];
                     let problem = format!("z of {what} of vehicle {} must be 0 in the plane, got {z}", i + 1);
                     let help = "set z to 0, or swarm.dimensions to 3";
-                    return Err(ScenarioError::new(ErrorKind::Plane, problem, help)
-                        .at_leg_entry(leg, key, i)
-                        .at("swarm.dimensions"));
+                    return Err(ErrorKind::Plane.at(&[&entry_key(&key, i), "swarm.dimensions"], problem, help));
                 }
             }
         }
@@ -297,11 +285,9 @@ impl Scenario {
 
     fn check_separations(&self) -> Result<(), ScenarioError> {
         let delta_m = self.delta_m;
-        let refuse = |said: String, help: &str, (leg, key): (usize, &'static str), pair: Pair| {
-            Err(ScenarioError::new(ErrorKind::WithinDelta, said, help)
-                .at_leg_entry(leg, key, pair.second())
-                .at_leg_entry(leg, key, pair.first())
-                .at("law.delta_m"))
+        let refuse = |said: String, help: &str, key: &str, pair: Pair| {
+            let keys = [entry_key(key, pair.second()), entry_key(key, pair.first())];
+            Err(ErrorKind::WithinDelta.at(&[&keys[0], &keys[1], "law.delta_m"], said, help))
         };
         let metric = self.metric();
         let apart = if metric.is_metres() { "apart," } else { "apart, scaled to the ellipsoid," };
@@ -313,7 +299,7 @@ impl Scenario {
                 format!("vehicles {pair} start {separation} m {apart} not more than delta = {delta_m} m")
             };
             let help = "move one of the vehicles away, or reduce law.delta_m";
-            return refuse(said, help, (0, "start.positions_m"), pair);
+            return refuse(said, help, "start.positions_m", pair);
         }
         let least_m = delta_m * (1.0 + SLOT_MARGIN);
         let too_near = |(number, leg): (usize, &Leg)| {
@@ -331,7 +317,7 @@ impl Scenario {
                 )
             };
             let help = "enlarge the formation, or reduce law.delta_m";
-            return refuse(said, help, (leg, "formation.points_m"), pair);
+            return refuse(said, help, &leg_key(leg, "points_m"), pair);
         }
         Ok(())
     }
@@ -364,10 +350,11 @@ impl Scenario {
             }
             _ => format!("law.delta_m must be more than {CONTACT_PREDICTION_M} m"),
         };
-        Err(ScenarioError::new(ErrorKind::HullsTouch, problem, help)
-            .at_entry("swarm.hull_radius_m", i)
-            .at_entry("swarm.hull_radius_m", j)
-            .at("law.delta_m"))
+        Err(ErrorKind::HullsTouch.at(
+            &[&entry_key("swarm.hull_radius_m", i), &entry_key("swarm.hull_radius_m", j), "law.delta_m"],
+            problem,
+            help,
+        ))
     }
 
     fn check_time(&self) -> Result<(), ScenarioError> {
@@ -375,7 +362,7 @@ impl Scenario {
         if dt_s > duration_s {
             let problem = format!("one step of {dt_s} s is longer than the flight of {duration_s} s");
             let help = "enlarge time.duration_s or reduce time.dt_s";
-            return Err(ScenarioError::new(ErrorKind::StepTooLong, problem, help).at("time.duration_s"));
+            return Err(ErrorKind::StepTooLong.at(&["time.duration_s"], problem, help));
         }
         let steps = duration_s / dt_s;
         if steps > MAX_STEPS {
@@ -383,9 +370,7 @@ impl Scenario {
                 "a flight has at most {MAX_STEPS:e} steps, got {steps:.2e} ({duration_s} s in steps of {dt_s} s)"
             );
             let help = format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor());
-            return Err(
-                ScenarioError::new(ErrorKind::TooManySteps, problem, help).at_keys(["time.duration_s", "time.dt_s"])
-            );
+            return Err(ErrorKind::TooManySteps.at(&["time.duration_s", "time.dt_s"], problem, help));
         }
         if self.a22_per_s.abs() * dt_s > 1.0 {
             let problem = format!(
@@ -393,9 +378,7 @@ impl Scenario {
                 1.0 / self.a22_per_s.abs()
             );
             let help = "reduce time.dt_s or swarm.a22_per_s";
-            return Err(
-                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["swarm.a22_per_s", "time.dt_s"])
-            );
+            return Err(ErrorKind::StepTooLong.at(&["swarm.a22_per_s", "time.dt_s"], problem, help));
         }
         if let Some(control_hz) = control_hz
             && control_hz * dt_s > 1.0 + 1e-6
@@ -403,9 +386,7 @@ impl Scenario {
             let problem =
                 format!("a control rate of {control_hz} Hz evaluates the law more than once in a step of {dt_s} s");
             let help = format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s);
-            return Err(
-                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["time.control_hz", "time.dt_s"])
-            );
+            return Err(ErrorKind::StepTooLong.at(&["time.control_hz", "time.dt_s"], problem, help));
         }
         Ok(())
     }
@@ -417,8 +398,7 @@ impl Scenario {
             let problem =
                 format!("spread slots must be held for less than the flight of {duration_s} s, got {hold_s} s");
             let help = "reduce deadlock.hold_s or increase time.duration_s: the slots must come together again";
-            return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
-                .at_keys(["deadlock.hold_s", "time.duration_s"]));
+            return Err(ErrorKind::OutsideFlight.at(&["deadlock.hold_s", "time.duration_s"], problem, help));
         }
         if self.deadlock.mode == DeadlockMode::Start
             && let Ok(law) = self.law()
@@ -426,9 +406,7 @@ impl Scenario {
         {
             let problem = format!("the law `{}` does not support deadlock recovery", law.name());
             let help = "leave out deadlock.mode, or set law.kind to \"displacement\"";
-            return Err(
-                ScenarioError::new(ErrorKind::UnsupportedByLaw, problem, help).at_keys(["deadlock.mode", "law.kind"])
-            );
+            return Err(ErrorKind::UnsupportedByLaw.at(&["deadlock.mode", "law.kind"], problem, help));
         }
         Ok(())
     }
@@ -440,14 +418,14 @@ impl Scenario {
         if a_m != b_m {
             let problem = format!("the horizontal half axes must be equal, got {a_m} m and {b_m} m");
             let help = "vehicles turn: set both to the larger one";
-            return Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help).at(key));
+            return Err(ErrorKind::Inconsistent.at(&[key], problem, help));
         }
         let (delta_m, width_m) = (self.delta_m, 2.0 * a_m);
         if (delta_m - width_m).abs() > ROUNDING * width_m {
             let problem =
                 format!("the safety distance must be the width of the ellipsoid, {width_m} m, got {delta_m} m");
             let help = "leave out law.delta_m: it is twice the horizontal half axes";
-            return Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help).at_keys(["law.delta_m", key]));
+            return Err(ErrorKind::Inconsistent.at(&["law.delta_m", key], problem, help));
         }
         let Ok(law) = self.law() else { return Ok(()) };
         // A shield keeps the ellipsoids apart under any law.
@@ -456,7 +434,7 @@ impl Scenario {
         }
         let problem = format!("the law `{}` does not support ellipsoids", law.name());
         let help = "set law.kind to \"displacement\", or safety.shape to \"ball\"";
-        Err(ScenarioError::new(ErrorKind::UnsupportedByLaw, problem, help).at_keys(["safety.shape", "law.kind"]))
+        Err(ErrorKind::UnsupportedByLaw.at(&["safety.shape", "law.kind"], problem, help))
     }
 
     /// Checks that the wind acts on the vehicles, and its velocities and gusts.
@@ -469,21 +447,17 @@ impl Scenario {
                 1.0 / drag_per_s
             );
             let help = "reduce time.dt_s or vehicle.drag_per_s";
-            return Err(
-                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["vehicle.drag_per_s", "time.dt_s"])
-            );
+            return Err(ErrorKind::StepTooLong.at(&["vehicle.drag_per_s", "time.dt_s"], problem, help));
         }
         if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
             let problem = format!("only points have vehicle.drag_per_s, got {drag_per_s} 1/s");
             let help = "leave it out: the drag of a quadrotor is part of its model";
-            return Err(ScenarioError::new(ErrorKind::UnsupportedByVehicle, problem, help)
-                .at_keys(["vehicle.drag_per_s", "vehicle.model"]));
+            return Err(ErrorKind::UnsupportedByVehicle.at(&["vehicle.drag_per_s", "vehicle.model"], problem, help));
         }
         if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
             let problem = "the wind has no effect on points without drag";
             let help = "set vehicle.drag_per_s, for example to 0.3";
-            return Err(ScenarioError::new(ErrorKind::UnsupportedByVehicle, problem, help)
-                .at_keys(["wind", "vehicle.drag_per_s"]));
+            return Err(ErrorKind::UnsupportedByVehicle.at(&["wind", "vehicle.drag_per_s"], problem, help));
         }
         self.check_air("wind.mean_m_s", "the mean wind", self.wind.mean_m_s)?;
         self.wind.gusts.iter().try_for_each(|gust| self.check_gust(gust))
@@ -494,7 +468,7 @@ impl Scenario {
         if self.space == Space::Plane && air_m_s.z != 0.0 {
             let problem = format!("{what} blows at {} m/s along z, out of the plane z = 0", air_m_s.z);
             let help = "set its z to 0, or swarm.dimensions to 3";
-            return Err(ScenarioError::new(ErrorKind::Plane, problem, help).at_keys([key, "swarm.dimensions"]));
+            return Err(ErrorKind::Plane.at(&[key, "swarm.dimensions"], problem, help));
         }
         Ok(())
     }
@@ -507,30 +481,25 @@ impl Scenario {
             if slope_s < shortest_s {
                 let problem = format!("{what} takes {slope_s} s, too short for steps of {} s", self.time.dt_s);
                 let help = format!("give it at least {shortest_s} s, or reduce time.dt_s");
-                return Err(
-                    ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["wind.gust", "time.dt_s"])
-                );
+                return Err(ErrorKind::StepTooLong.at(&["wind.gust", "time.dt_s"], problem, help));
             }
         }
         if at_s >= self.time.duration_s {
             let problem = format!("a gust must begin within the flight of {} s, got {at_s} s", self.time.duration_s);
             let help = "let it begin earlier, or enlarge time.duration_s";
-            return Err(
-                ScenarioError::new(ErrorKind::OutsideFlight, problem, help).at_keys(["wind.gust", "time.duration_s"])
-            );
+            return Err(ErrorKind::OutsideFlight.at(&["wind.gust", "time.duration_s"], problem, help));
         }
         match vehicles.as_deref() {
-            Some([]) => Err(ScenarioError::new(
-                ErrorKind::Inconsistent,
+            Some([]) => Err(ErrorKind::Inconsistent.at(
+                &["wind.gust"],
                 "the list of vehicles of a gust is empty",
                 "leave out `vehicles`: the gust then acts on all vehicles",
-            )
-            .at("wind.gust")),
+            )),
             met => match met.unwrap_or_default().iter().find(|&&vehicle| vehicle >= self.count()) {
                 Some(vehicle) => {
                     let problem = format!("a gust acts on vehicle {}, but the swarm has {}", vehicle + 1, self.count());
                     let help = format!("give numbers from 1 to {}", self.count());
-                    Err(ScenarioError::new(ErrorKind::UnknownVehicle, problem, help).at("wind.gust"))
+                    Err(ErrorKind::UnknownVehicle.at(&["wind.gust"], problem, help))
                 }
                 None => Ok(()),
             },
@@ -540,32 +509,30 @@ impl Scenario {
 
 /// Returns an error of the parameters of a law at its key.
 fn of_law(error: &ParameterError) -> ScenarioError {
-    let refuse =
-        |help: &str| ScenarioError::new(ErrorKind::LawParameter, format!("no law has these parameters: {error}"), help);
+    let slot = |vehicle| entry_key("formation.points_m", vehicle);
+    let refuse = |help: &str, keys: &[&str]| {
+        ErrorKind::LawParameter.at(keys, format!("no law has these parameters: {error}"), help)
+    };
     match *error {
-        ParameterError::Tension { pair, .. } => refuse("enlarge the formation, or change law.delta_m")
-            .at_entry("formation.points_m", pair.second())
-            .at_entry("formation.points_m", pair.first())
-            .at("law.delta_m"),
-        ParameterError::ObstacleOverSlot { vehicle, obstacle, .. } => {
-            refuse("move one of them away, or reduce the clearance_m of the obstacle")
-                .at_entry("formation.points_m", vehicle)
-                .at_entry("obstacle", obstacle)
+        ParameterError::Tension { pair, .. } => {
+            let keys = [&*slot(pair.second()), &slot(pair.first()), "law.delta_m"];
+            refuse("enlarge the formation, or change law.delta_m", &keys)
         }
-        ParameterError::Slot { vehicle } => refuse("give finite numbers").at_entry("formation.points_m", vehicle),
+        ParameterError::ObstacleOverSlot { vehicle, obstacle, .. } => {
+            let help = "move one of them away, or reduce the clearance_m of the obstacle";
+            refuse(help, &[&slot(vehicle), &entry_key("obstacle", obstacle)])
+        }
+        ParameterError::Slot { vehicle } => refuse("give finite numbers", &[&slot(vehicle)]),
         ParameterError::Counts { .. } | ParameterError::Disconnected { .. } => {
-            refuse("add edges until every vehicle can be reached from every other").at("graph.edges")
+            refuse("add edges until every vehicle can be reached from every other", &["graph.edges"])
         }
         ParameterError::ReferenceUnknown | ParameterError::ReferenceNotHeard => {
-            refuse("leave it out: then all vehicles know the reference; or add edges to the graph").at_keys([
-                "reference.known_by",
-                "reference.leader",
-                "graph.edges",
-            ])
+            let help = "leave it out: then all vehicles know the reference; or add edges to the graph";
+            refuse(help, &["reference.known_by", "reference.leader", "graph.edges"])
         }
-        ParameterError::NotFinite { .. } => refuse("give finite numbers").at("law.kind"),
+        ParameterError::NotFinite { .. } => refuse("give finite numbers", &["law.kind"]),
         ParameterError::Memory { .. } => {
-            refuse("use fewer vehicles, or a graph of fewer edges").at_keys(["swarm.count", "graph.kind"])
+            refuse("use fewer vehicles, or a graph of fewer edges", &["swarm.count", "graph.kind"])
         }
     }
 }
@@ -580,7 +547,7 @@ fn check_size(what: &str, number: f64) -> Result<(), ScenarioError> {
         _ if number.is_infinite() => (format!("{what} is infinite"), "give a finite number"),
         _ => (format!("{what} must be at most {LARGEST:e} in magnitude, got {number:e}"), "give a smaller number"),
     };
-    Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help))
+    Err(ErrorKind::OutOfRange.at(&[], problem, help))
 }
 
 fn check_name(name: &str) -> Result<(), ScenarioError> {
@@ -593,7 +560,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     } else {
         return Ok(());
     };
-    Err(ScenarioError::new(ErrorKind::Name, said, "it names a folder: use letters, digits, `-` and `_`").at("name"))
+    Err(ErrorKind::Name.at(&["name"], said, "it names a folder: use letters, digits, `-` and `_`"))
 }
 
 /// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
@@ -606,5 +573,5 @@ fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
     let more = if apart.len() > NAMED_VEHICLES { " and more" } else { "" };
     let problem = format!("the graph is not connected: no path joins vehicle 1 to {}{more}", named.join(", "));
     let help = "add edges until every vehicle can be reached from every other";
-    Err(ScenarioError::new(ErrorKind::Disconnected, problem, help).at("graph.edges"))
+    Err(ErrorKind::Disconnected.at(&["graph.edges"], problem, help))
 }

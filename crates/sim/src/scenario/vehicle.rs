@@ -6,13 +6,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::is_default;
-use super::error::{ErrorKind, ScenarioError, suggest};
+use super::error::{ErrorKind, ScenarioError, entry_key, suggest};
 use super::files;
 use super::spec::{PlantSpec, Scenario, Space};
-use crate::vehicle::{
-    self, Airframe, Fleet, Ground, Heading, MODELS, Model, ModelError, ModelParseError, Quadrotor, Unicycle,
-};
-use tautline_core::failure::Place;
+use crate::vehicle::{self, Airframe, Fleet, Ground, Heading, MODELS, Model, Quadrotor, Unicycle};
 use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::row;
 
@@ -136,13 +133,13 @@ impl VehicleTable {
             ModelKey::Given(model) => Model::clone(model),
             ModelKey::Named(name) => {
                 let known = MODELS.map(|(known, _)| known);
-                let found =
-                    MODELS.iter().find(|(known, _)| known == name).and_then(|(_, text)| vehicle::read(text).ok());
+                let found = MODELS.iter().find(|(known, _)| known == name);
+                let found = found.and_then(|(name, text)| vehicle::read(name, text).ok());
                 found.ok_or_else(|| {
                     let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
                     let help = format!("{}; for another model give the path of a TOML file", suggest(name, &known));
                     let problem = format!("no model has the name `{name}`");
-                    ScenarioError::new(ErrorKind::UnknownChoice, problem, help).at(MODEL)
+                    ErrorKind::UnknownChoice.at(&[MODEL], problem, help)
                 })?
             }
         };
@@ -193,7 +190,7 @@ fn refuse_given<const N: usize>(
 ) -> Result<(), ScenarioError> {
     let Some((key, _)) = keys.into_iter().find(|(_, is_given)| *is_given) else { return Ok(()) };
     let help = format!("leave this key out, or set vehicle.model to {other_model}");
-    Err(ScenarioError::new(ErrorKind::UnsupportedByVehicle, said, help).at_keys([key, MODEL]))
+    Err(ErrorKind::UnsupportedByVehicle.at(&[key, MODEL], said, help))
 }
 
 /// Converts the airframe back: a built-in model to its name, any other model to its keys.
@@ -206,7 +203,7 @@ impl From<&Scenario> for VehicleTable {
             Airframe::Quadrotor(quadrotor) => quadrotor,
         };
         let model = &quadrotor.model;
-        let built_in = MODELS.iter().filter_map(|(name, text)| Some((*name, vehicle::read(text).ok()?)));
+        let built_in = MODELS.iter().filter_map(|(name, text)| Some((*name, vehicle::read(name, text).ok()?)));
         let is_it = |(_, other): &(&str, Model)| {
             let (attitude_rad_s, attitude_damping) = (model.attitude_rad_s, model.attitude_damping);
             let is_same_loop = (attitude_rad_s, attitude_damping) == (other.attitude_rad_s, other.attitude_damping);
@@ -244,12 +241,9 @@ impl From<&Unicycle> for VehicleTable {
 /// Reads the file of a model.
 fn read(path: &Path) -> Result<Model, ScenarioError> {
     let shown = path.display().to_string();
-    let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
-        ScenarioError::new(ErrorKind::File, format!("{shown} is not UTF-8"), "save the file as UTF-8 text").at(MODEL)
-    })?;
-    vehicle::read(&text).map_err(|ModelParseError { message, help, span }| {
-        ScenarioError::new(ErrorKind::File, message, help).with_place(Place::new(&shown, &text, span))
-    })
+    let text = String::from_utf8(files::bytes(path, MODEL)?)
+        .map_err(|_| ErrorKind::File.at(&[MODEL], format!("{shown} is not UTF-8"), "save the file as UTF-8 text"))?;
+    vehicle::read(&shown, &text)
 }
 
 /// Default rate of the attitude loop \[Hz\].
@@ -293,16 +287,14 @@ impl Scenario {
     pub(super) fn check_airframe(&self) -> Result<(), ScenarioError> {
         self.check_unicycle()?;
         let Some(Quadrotor { model, attitude_hz, .. }) = self.airframe.quadrotor() else { return Ok(()) };
-        let refuse = |ModelError { key, message, help }| {
-            let key = match key {
+        let refuse = |error: ScenarioError| {
+            let own = match &*error.keys[0] {
                 "attitude_rad_s" => "vehicle.attitude_rad_s",
                 "attitude_damping" => "vehicle.attitude_damping",
                 _ => "vehicle.model",
             };
-            ScenarioError::new(ErrorKind::Inconsistent, message, help)
-                .at(key)
-                .at("vehicle.attitude_damping")
-                .at("vehicle.model")
+            let keys = [own, "vehicle.attitude_damping", "vehicle.model"];
+            ScenarioError { keys: keys.map(str::to_owned).to_vec(), ..error }
         };
         model.check().map_err(refuse)?;
         if attitude_hz * self.time.dt_s > 1.0 + ROUNDING {
@@ -313,11 +305,9 @@ impl Scenario {
                 1.0 / self.time.dt_s,
                 1.0 / attitude_hz
             );
-            return Err(
-                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["vehicle.attitude_hz", "time.dt_s"])
-            );
+            return Err(ErrorKind::StepTooLong.at(&["vehicle.attitude_hz", "time.dt_s"], problem, help));
         }
-        model.check_attitude(0.5 / attitude_hz).map_err(|error| refuse(error).at("vehicle.attitude_hz"))
+        model.check_attitude(0.5 / attitude_hz).map_err(|error| refuse(error).at(&["vehicle.attitude_hz"]))
     }
 }
 
@@ -333,35 +323,28 @@ impl Scenario {
             let problem =
                 format!("the smallest speed must be at most the largest, {max_speed_m_s} m/s, got {min_speed_m_s} m/s");
             let help = "reduce vehicle.min_speed_m_s, or enlarge vehicle.max_speed_m_s";
-            return Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help)
-                .at_keys(["vehicle.min_speed_m_s", "vehicle.max_speed_m_s"]));
+            return Err(ErrorKind::Inconsistent.at(&["vehicle.min_speed_m_s", "vehicle.max_speed_m_s"], problem, help));
         }
         if self.space != Space::Plane {
             let problem = "unicycles need the plane z = 0, but the swarm has three dimensions";
             let help = "set every z to 0 and swarm.dimensions to 2, or fly another vehicle.model";
-            return Err(
-                ScenarioError::new(ErrorKind::Plane, problem, help).at_keys(["vehicle.model", "swarm.dimensions"])
-            );
+            return Err(ErrorKind::Plane.at(&["vehicle.model", "swarm.dimensions"], problem, help));
         }
         if !matches!(self.plant, PlantSpec::Rapier) {
             let problem = "the ideal plant does not support unicycles";
             let help = "leave out plant.kind: the motion of a unicycle is solved in closed form";
-            return Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help)
-                .at_keys(["plant.kind", "vehicle.model"]));
+            return Err(ErrorKind::UnsupportedByPlant.at(&["plant.kind", "vehicle.model"], problem, help));
         }
         if self.a22_per_s != 0.0 {
             let problem = "a unicycle has no velocity coefficient a22";
             let help = "leave out swarm.a22_per_s";
-            return Err(ScenarioError::new(ErrorKind::UnsupportedByVehicle, problem, help)
-                .at_keys(["swarm.a22_per_s", "vehicle.model"]));
+            return Err(ErrorKind::UnsupportedByVehicle.at(&["swarm.a22_per_s", "vehicle.model"], problem, help));
         }
         if self.drag_per_s != 0.0 || !self.wind.is_still() {
             let key = if self.drag_per_s == 0.0 { "wind" } else { "vehicle.drag_per_s" };
             let problem = "wind and drag do not act on unicycles";
             let help = "leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model";
-            return Err(
-                ScenarioError::new(ErrorKind::UnsupportedByVehicle, problem, help).at_keys([key, "vehicle.model"])
-            );
+            return Err(ErrorKind::UnsupportedByVehicle.at(&[key, "vehicle.model"], problem, help));
         }
         for i in 0..self.count() {
             let speed_m_s = Heading::of(row(&self.start.velocities_m_s, i)).speed_m_s;
@@ -372,9 +355,11 @@ impl Scenario {
                     i + 1
                 );
                 let help = "give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed";
-                return Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help)
-                    .at_entry("start.velocities_m_s", i)
-                    .at_keys(["vehicle.min_speed_m_s", "vehicle.model"]));
+                return Err(ErrorKind::OutOfRange.at(
+                    &[&entry_key("start.velocities_m_s", i), "vehicle.min_speed_m_s", "vehicle.model"],
+                    problem,
+                    help,
+                ));
             }
         }
         Ok(())

@@ -17,10 +17,10 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::search::{self, GENERATIONS, Leg, Numbers, Plan};
-use super::{ShieldSpec, refused, refused_with};
+use super::{ShieldSpec, refused};
 use crate::link;
 use crate::plant::{self, StepPath};
-use crate::scenario::{Scenario, ScenarioError, Space};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError, Space};
 use crate::vehicle::{Model, Tracking, TrackingSearch};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
@@ -143,12 +143,13 @@ impl Scenario {
     /// [`ScenarioError`] without quadrotors or shield, or if the tracker does not hold the vehicle on its reference.
     pub fn identify(&self) -> Result<Identification, ScenarioError> {
         let Some(quadrotor) = self.airframe.quadrotor() else {
+            let problem = "only the tracking error of quadrotors is measured";
             let help = "points have a computed bound; set vehicle.model to a quadrotor";
-            return Err(refused_with("only the tracking error of quadrotors is measured", help).at("vehicle.model"));
+            return Err(ErrorKind::Shield.at(&["vehicle.model"], problem, help));
         };
         let Some(given) = self.shield else {
-            return Err(refused_with("there is no shield whose tracking error could be measured", "add [shield]")
-                .at("vehicle.model"));
+            let problem = "there is no shield whose tracking error could be measured";
+            return Err(ErrorKind::Shield.at(&["vehicle.model"], problem, "add [shield]"));
         };
         let mut alone = self.alone();
         let mut spec = alone.shield_keys().unwrap_or(given);
@@ -189,17 +190,17 @@ impl Scenario {
                 let ratio = needed_m_s2 / limits.reference_m_s2();
                 share = if is_held { (1.02 * ratio / (1.0 + ratio)).min(0.98) } else { 0.5 * (1.0 + share) };
             }
-            return Err(refused_with(
-                "the tracker does not hold the vehicle on its reference",
-                "lower shield.tracker_per_s2, shield.tracker_per_s, shield.accel_m_s2 or the wind",
-            )
-            .at_keys(["shield.tracker_per_s2", "shield.tracker_per_s", "shield.accel_m_s2"]));
+            let keys = ["shield.tracker_per_s2", "shield.tracker_per_s", "shield.accel_m_s2"];
+            let problem = "the tracker does not hold the vehicle on its reference";
+            let help = "lower shield.tracker_per_s2, shield.tracker_per_s, shield.accel_m_s2 or the wind";
+            return Err(ErrorKind::Shield.at(&keys, problem, help));
         };
         let settings = limits.settings();
         if flown.command_m_s2 > settings.accel_m_s2 {
             let help = "raise shield.disturbance_m_s2, or leave it out";
-            return Err(refused("the tracker commands more than shield.accel_m_s2, up to", flown.command_m_s2, help)
-                .at_keys(["shield.disturbance_m_s2", "shield.accel_m_s2"]));
+            let problem = "the tracker commands more than shield.accel_m_s2, up to";
+            let keys = ["shield.disturbance_m_s2", "shield.accel_m_s2"];
+            return Err(refused(&keys, problem, flown.command_m_s2, help));
         }
         let largest_error_m = (flown.worst.error_m * 1e4).ceil() / 1e4;
         let search = TrackingSearch {
@@ -244,7 +245,7 @@ impl Scenario {
     }
 
     fn limits_alone(&self) -> Result<Limits, ScenarioError> {
-        self.shield_limits()?.ok_or_else(|| refused_with("there is no shield", "add [shield]"))
+        self.shield_limits()?.ok_or_else(|| ErrorKind::Shield.at(&[], "there is no shield", "add [shield]"))
     }
 
     /// Returns the scenario with one vehicle at rest at the origin, in still air, without errors and other bodies.

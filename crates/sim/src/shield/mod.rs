@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space, is_default};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space, entry_key, is_default};
 use crate::sim::MAX_BEND;
 use tautline_core::obstacle;
 use tautline_core::swarm::row;
@@ -149,19 +149,15 @@ impl Scenario {
         let Some(control_hz) = self.time.control_hz else {
             let problem = "the shield holds commands over periods, but no rate of commands is given";
             let help = format!("set time.control_hz, such as {SHIELD_CONTROL_HZ}");
-            return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at("shield"));
+            return Err(ErrorKind::MissingKey.at(&["shield"], problem, help));
         };
         let most_m_s2 = self.actuation.max_accel_m_s2;
         let settings = self.shield_settings(spec, control_hz)?;
         let accel_m_s2 = settings.accel_m_s2;
         if most_m_s2.is_some_and(|most_m_s2| accel_m_s2 > most_m_s2) {
             let help = format!("reduce it to at most {}", most_m_s2.unwrap_or_default());
-            return Err(refused(
-                "shield.accel_m_s2 is more than actuation.max_accel_m_s2 carries out",
-                accel_m_s2,
-                &help,
-            )
-            .at_keys(["shield.accel_m_s2", "actuation.max_accel_m_s2"]));
+            let problem = "shield.accel_m_s2 is more than actuation.max_accel_m_s2 carries out";
+            return Err(refused(&["shield.accel_m_s2", "actuation.max_accel_m_s2"], problem, accel_m_s2, &help));
         }
         settings.limits().map(Some).map_err(|error| self.of_shield(&error))
     }
@@ -222,19 +218,16 @@ impl Scenario {
         let periods = age_s * control_hz;
         if !is_whole(per_period) || per_period < 0.5 {
             let help = format!("set sensing.rate_hz to {control_hz} or a multiple of it");
-            return Err(refused("the number of measurements per control period must be whole", per_period, &help)
-                .at_keys(["sensing.rate_hz", "time.control_hz"]));
+            let problem = "the number of measurements per control period must be whole";
+            return Err(refused(&["sensing.rate_hz", "time.control_hz"], problem, per_period, &help));
         }
         if is_whole(periods) {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; more saturates")]
             return Ok(periods.round() as usize);
         }
         let help = format!("set sensing.rate_hz to {control_hz}, or a latency of whole periods");
-        Err(refused("the age of measurements must be a whole number of control periods", periods, &help).at_keys([
-            "sensing.rate_hz",
-            "sensing.latency_s",
-            "time.control_hz",
-        ]))
+        let problem = "the age of measurements must be a whole number of control periods";
+        Err(refused(&["sensing.rate_hz", "sensing.latency_s", "time.control_hz"], problem, periods, &help))
     }
 
     /// Returns the starts of all vehicles under a shield.
@@ -242,7 +235,7 @@ impl Scenario {
         let start = |i: usize| {
             let state =
                 State { position_m: row(&self.start.positions_m, i), velocity_m_s: row(&self.start.velocities_m_s, i) };
-            limits.start(state).map_err(|error| self.of_shield(&error).at_entry("start.positions_m", i))
+            limits.start(state).map_err(|error| self.of_shield(&error).at(&[&entry_key("start.positions_m", i)]))
         };
         (0..self.count()).map(start).collect()
     }
@@ -253,7 +246,7 @@ impl Scenario {
         let obstacles: Vec<_> = self.obstacles.iter().map(keep_out).collect();
         let fleet = Fleet::new(&vec![*limits; self.count()], states);
         let fleet = fleet.and_then(|fleet| fleet.with_obstacles(&obstacles));
-        fleet.map_err(|error| self.of_shield(&error).at("start.positions_m"))
+        fleet.map_err(|error| self.of_shield(&error).at(&["start.positions_m"]))
     }
 
     /// Returns the pair of starts with the least room, and the pair of slots of any leg; `None` without a shield.
@@ -283,15 +276,15 @@ impl Scenario {
     pub(crate) fn check_shield(&self) -> Result<(), ScenarioError> {
         let Some(spec) = &self.shield_keys() else { return Ok(()) };
         if self.airframe.unicycle().is_some() {
-            return Err(refused_with("the shield has no contract for unicycles", "use points or quadrotors")
-                .at_keys(["vehicle.model", "shield"]));
+            let (problem, help) = ("the shield has no contract for unicycles", "use points or quadrotors");
+            return Err(ErrorKind::Shield.at(&["vehicle.model", "shield"], problem, help));
         }
         if let Some(control_hz) = self.time.control_hz {
             let steps = 1.0 / (control_hz * self.time.dt_s);
             if !is_whole(steps) {
                 let help = "change time.control_hz or time.dt_s";
-                return Err(refused("a control period must be a whole number of steps", steps, help)
-                    .at_keys(["time.control_hz", "time.dt_s"]));
+                let problem = "a control period must be a whole number of steps";
+                return Err(refused(&["time.control_hz", "time.dt_s"], problem, steps, help));
             }
         }
         self.check_tracking(spec)?;
@@ -310,7 +303,7 @@ impl Scenario {
             if noise > 0.0 && noise >= bound {
                 let problem = format!("{key} must be more than {what}, the standard deviation of an unbounded error");
                 let help = format!("raise it to {}, six deviations", 6.0 * noise);
-                return Err(refused(&problem, bound, &help).at_keys([key, what]));
+                return Err(refused(&[key, what], &problem, bound, &help));
             }
         }
         let push_m_s2 = self.drag_per_s * self.fastest_wind_m_s();
@@ -319,16 +312,16 @@ impl Scenario {
             let least = shortest(push_m_s2);
             let problem =
                 format!("shield.disturbance_m_s2 must be at least {least}, which is drag times the fastest wind");
-            return Err(refused(&problem, disturbance_m_s2, "raise it, or reduce the wind")
-                .at_keys(["shield.disturbance_m_s2", "vehicle.drag_per_s"]));
+            let keys = ["shield.disturbance_m_s2", "vehicle.drag_per_s"];
+            return Err(refused(&keys, &problem, disturbance_m_s2, "raise it, or reduce the wind"));
         }
         self.check_shield_memory()?;
         let Some(limits) = self.shield_limits()? else { return Ok(()) };
         let starts = self.shield_starts(&limits)?;
         if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
             let (i, j) = worst.pair;
-            let error = self.of_shield(&worst.too_near());
-            return Err(error.at_entry("start.positions_m", i).at_entry("start.positions_m", j));
+            let keys = [i, j].map(|i| entry_key("start.positions_m", i));
+            return Err(self.of_shield(&worst.too_near()).at(&[&keys[0], &keys[1]]));
         }
         let states: Vec<_> = starts.iter().map(|start| start.state).collect();
         self.shield_fleet(&limits, &states).map(drop)
@@ -359,8 +352,8 @@ impl Scenario {
             "path_error_m" | "integration_error_m_s2" => "time.dt_s",
             _ => "shield",
         };
-        let found = refused(&error.problem, error.value, error.remedy);
-        if error.place == "start" { found } else { found.at(key) }
+        let keys = if error.place == "start" { &[][..] } else { &[key] };
+        refused(keys, &error.problem, error.value, error.remedy)
     }
 
     fn check_shield_memory(&self) -> Result<(), ScenarioError> {
@@ -379,7 +372,7 @@ impl Scenario {
             bytes >> 30
         );
         let help = "use fewer vehicles or a shorter network.latency_s";
-        Err(ScenarioError::new(ErrorKind::Memory, problem, help).at_keys(["shield", "network.latency_s"]))
+        Err(ErrorKind::Memory.at(&["shield", "network.latency_s"], problem, help))
     }
 }
 
@@ -399,10 +392,6 @@ fn is_whole(number: f64) -> bool {
 }
 
 /// Returns an error about a value: `PROBLEM (VALUE)`.
-fn refused(problem: &str, value: f64, help: &str) -> ScenarioError {
-    refused_with(&format!("{problem} ({})", shortest(value)), help)
-}
-
-fn refused_with(problem: &str, help: &str) -> ScenarioError {
-    ScenarioError::new(ErrorKind::Shield, problem, help)
+fn refused(keys: &[&str], problem: &str, value: f64, help: &str) -> ScenarioError {
+    ErrorKind::Shield.at(keys, format!("{problem} ({})", shortest(value)), help)
 }

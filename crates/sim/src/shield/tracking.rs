@@ -1,8 +1,8 @@
 //! Quadrotors under a shield: keys from the measured `[tracking]` table of their model, and its conditions.
 
 use super::search::CHANGED_FLIGHTS;
-use super::{SAME, ShieldSpec, TRACKING_FACTOR, refused, refused_with};
-use crate::scenario::{Scenario, ScenarioError, Space};
+use super::{SAME, ShieldSpec, TRACKING_FACTOR, refused};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError, Space};
 use crate::vehicle::{self, MODELS, Quadrotor, Tracking, TrackingSearch};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::IDENTIFY;
@@ -177,8 +177,8 @@ impl Scenario {
         if let Some(accel_m_s2) = spec.accel_m_s2.filter(|accel_m_s2| *accel_m_s2 > most_m_s2) {
             let most = shortest(most_m_s2);
             let problem = format!("shield.accel_m_s2 must be at most {most}, which thrust and lift allow");
-            return Err(refused(&problem, accel_m_s2, "reduce it; the default is that of the model")
-                .at_keys(["shield.accel_m_s2", "vehicle.model"]));
+            let help = "reduce it; the default is that of the model";
+            return Err(refused(&["shield.accel_m_s2", "vehicle.model"], &problem, accel_m_s2, help));
         }
         if spec.tracking_error_m.is_some() {
             return Ok(());
@@ -196,16 +196,16 @@ impl Scenario {
         };
         let command = format!("tautline check {}", IDENTIFY.argument());
         let help = format!("measure it with `{command}`, and set shield.tracking_error_m");
-        let error = refused_with(&problem, &help).at_keys(["shield.tracking_error_m", "vehicle.model"]);
-        Err(found.into_iter().fold(error, |error, (key, _)| error.at(key)))
+        let error = ErrorKind::Shield.at(&["shield.tracking_error_m", "vehicle.model"], &problem, &help);
+        Err(found.into_iter().fold(error, |error, (key, _)| error.at(&[key])))
     }
 
     /// Returns the first key of the attitude loop that differs from that of the measurement, with both values. The
     /// measurement is that of the built-in model.
     fn other_attitude_loop(&self) -> Option<(&'static str, f64, f64)> {
         let Quadrotor { model, .. } = self.airframe.quadrotor()?;
-        let (_, text) = MODELS.iter().find(|(name, _)| *name == model.name)?;
-        let measured = vehicle::read(text).ok().filter(|measured| measured.tracking.is_some())?;
+        let (name, text) = MODELS.iter().find(|(name, _)| *name == model.name)?;
+        let measured = vehicle::read(name, text).ok().filter(|measured| measured.tracking.is_some())?;
         let keys = [
             ("vehicle.attitude_rad_s", measured.attitude_rad_s, model.attitude_rad_s),
             ("vehicle.attitude_damping", measured.attitude_damping, model.attitude_damping),

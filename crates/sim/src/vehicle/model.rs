@@ -8,6 +8,8 @@ use toml::de::DeTable;
 
 use super::rotors::Mixer;
 use super::tracking::Tracking;
+use crate::scenario::{ErrorKind, ScenarioError};
+use tautline_core::failure::Place;
 use tautline_core::option::IDENTIFY;
 
 /// Standard acceleration of gravity \[m/s^2\]. Some published models use 9.8 or 9.81.
@@ -124,31 +126,22 @@ pub const MODELS: [(&str, &str); 3] = [
     ("hummingbird", embedded!("vehicles/hummingbird.toml")),
 ];
 
-/// Error in the text of a model, with its bytes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ModelParseError {
-    /// Message, one sentence.
-    pub message: String,
-    /// Remedy.
-    pub help: String,
-    /// Offending bytes.
-    pub span: Range<usize>,
-}
-
-/// Reads and checks a model.
+/// Reads and checks a model; `name` is the source in messages.
 ///
 /// # Errors
-/// [`ModelParseError`] if the text is not TOML, has a missing or unknown key, or the model is invalid.
-pub fn read(text: &str) -> Result<Model, ModelParseError> {
-    let model: Model = toml::from_str(text).map_err(|error| ModelParseError {
-        message: error.message().to_owned(),
-        help: "a model has the keys of the built-in ones, which docs/scenario.md lists".to_owned(),
-        span: error.span().unwrap_or(0..0),
+/// [`ScenarioError`] with its place if the text is not TOML, has a missing or unknown key, or the model is invalid.
+pub fn read(name: &str, text: &str) -> Result<Model, ScenarioError> {
+    let placed = |error: ScenarioError, span: Option<Range<usize>>| {
+        error.with_place(Place::new(name, text, span.unwrap_or_default()))
+    };
+    let model: Model = toml::from_str(text).map_err(|error| {
+        let help = "a model has the keys of the built-in ones, which docs/scenario.md lists";
+        placed(ErrorKind::File.at(&[], error.message(), help), error.span())
     })?;
-    model.check().map_err(|ModelError { key, message, help }| {
+    model.check().map_err(|error| {
         let table = DeTable::parse(text).ok();
-        let span = table.and_then(|table| Some(table.get_ref().get(key)?.span())).unwrap_or(0..0);
-        ModelParseError { message, help, span }
+        let span = table.and_then(|table| Some(table.get_ref().get(&*error.keys[0])?.span()));
+        placed(ScenarioError { kind: ErrorKind::File, ..error }, span)
     })?;
     Ok(model)
 }
@@ -156,30 +149,18 @@ pub fn read(text: &str) -> Result<Model, ModelParseError> {
 /// Smallest and largest magnitude of a positive number of a model, in its unit.
 const BOUNDS: (f64, f64) = (1e-12, 1e6);
 
-/// Error of a model.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{message}")]
-pub struct ModelError {
-    /// Key of the model.
-    pub key: &'static str,
-    /// Message, one sentence.
-    pub message: String,
-    /// Remedy.
-    pub help: String,
-}
-
 impl Model {
     /// Checks that a model can fly: positive numbers, a possible inertia, and rotors that lift it, turn it about every
     /// axis and are fast enough for its attitude loop.
     ///
     /// # Errors
-    /// [`ModelError`] for the first violated condition.
-    pub fn check(&self) -> Result<(), ModelError> {
+    /// [`ScenarioError`] for the first violated condition, with its key of the model.
+    pub fn check(&self) -> Result<(), ScenarioError> {
         self.check_numbers()?;
         self.check_body()?;
         if self.most_thrust_n() <= self.weight_n() {
-            return Err(refuse(
-                "max_thrust_n",
+            return Err(ErrorKind::Inconsistent.at(
+                &["max_thrust_n"],
                 format!(
                     "the largest thrust of four rotors is {} N, not more than the weight of {:.6} N",
                     self.most_thrust_n(),
@@ -189,10 +170,10 @@ impl Model {
             ));
         }
         if Mixer::new(self).is_none() {
-            return Err(refuse(
-                "rotor_positions_m",
-                "the rotors cannot lift, roll, pitch and yaw the vehicle independently".to_owned(),
-                "place them around the centre of mass, two of the four turning each way".to_owned(),
+            return Err(ErrorKind::Inconsistent.at(
+                &["rotor_positions_m"],
+                "the rotors cannot lift, roll, pitch and yaw the vehicle independently",
+                "place them around the centre of mass, two of the four turning each way",
             ));
         }
         self.check_attitude(0.0)
@@ -202,14 +183,14 @@ impl Model {
     /// polynomial is tau s^3 + s^2 + 2 zeta omega s + omega^2.
     ///
     /// # Errors
-    /// [`ModelError`] with the inequality.
-    pub fn check_attitude(&self, wait_s: f64) -> Result<(), ModelError> {
+    /// [`ScenarioError`] with the inequality.
+    pub fn check_attitude(&self, wait_s: f64) -> Result<(), ScenarioError> {
         let (zeta, omega, lag_s) = (self.attitude_damping, self.attitude_rad_s, self.lag_s() + wait_s);
         if 2.0 * zeta > omega * lag_s {
             return Ok(());
         }
-        Err(refuse(
-            "attitude_rad_s",
+        Err(ErrorKind::Inconsistent.at(
+            &["attitude_rad_s"],
             format!(
                 "the attitude loop is unstable. It needs 2 zeta > omega tau, got 2 * {zeta} <= {omega} rad/s * {lag_s} \
                  s (lag of the rotors and half a period of the loop)"
@@ -218,9 +199,9 @@ impl Model {
         ))
     }
 
-    fn check_numbers(&self) -> Result<(), ModelError> {
+    fn check_numbers(&self) -> Result<(), ScenarioError> {
         if self.name.trim().is_empty() {
-            return Err(refuse("name", "the name is empty".to_owned(), "name the model".to_owned()));
+            return Err(ErrorKind::Inconsistent.at(&["name"], "the name is empty", "name the model"));
         }
         let [jx, jy, jz] = self.inertia_kg_m2;
         let positive = [
@@ -241,13 +222,17 @@ impl Model {
         let (least, most) = BOUNDS;
         if let Some((key, number)) = positive.into_iter().find(|(_, number)| !(least..=most).contains(number)) {
             let help = format!("it must be from {least:e} to {most:e}");
-            return Err(refuse(key, format!("{key} is {number}"), help));
+            return Err(ErrorKind::Inconsistent.at(&[key], format!("{key} is {number}"), help));
         }
         let from_zero = self.rotor_drag_n_s_m.map(|drag| ("rotor_drag_n_s_m", drag));
         let squared = self.parasitic_drag_n_s2_m2.map(|drag| ("parasitic_drag_n_s2_m2", drag));
         let mut from_zero = from_zero.into_iter().chain(squared).chain([("ground_effect", self.ground_effect)]);
         if let Some((key, number)) = from_zero.find(|(_, number)| !(0.0..=most).contains(number)) {
-            return Err(refuse(key, format!("{key} is {number}"), format!("it must be from 0 to {most:e}")));
+            return Err(ErrorKind::Inconsistent.at(
+                &[key],
+                format!("{key} is {number}"),
+                format!("it must be from 0 to {most:e}"),
+            ));
         }
         if let Some(tracking) = &self.tracking {
             let (positive, from_zero) = tracking.numbers();
@@ -255,39 +240,41 @@ impl Model {
             let found = positive.into_iter().find(wrong(least)).or_else(|| from_zero.into_iter().find(wrong(0.0)));
             if let Some(number) = found {
                 let help = format!("its numbers must be from {least:e} to {most:e}; pushes, wind and errors may be 0");
-                return Err(refuse("tracking", format!("the table has the number {number}"), help));
+                return Err(ErrorKind::Inconsistent.at(
+                    &["tracking"],
+                    format!("the table has the number {number}"),
+                    help,
+                ));
             }
             if let Some(problem) = tracking.search.as_ref().and_then(|search| search.contradiction(tracking.error_m)) {
                 let command = format!("tautline check {}", IDENTIFY.argument());
                 let help = format!("measure the table with `{command}`, or leave out tracking.search");
-                return Err(refuse("tracking", problem, help));
+                return Err(ErrorKind::Inconsistent.at(&["tracking"], problem, help));
             }
         }
         let places = self.rotor_positions_m.iter().flatten().map(|&place| ("rotor_positions_m", place));
         let mut others = places.chain([("thrust_n_per_rpm", self.thrust_n_per_rpm)]);
         match others.find(|(_, number)| !(-most..=most).contains(number)) {
-            Some((key, number)) => Err(refuse(key, format!("{key} is {number}"), "give a finite number".to_owned())),
+            Some((key, number)) => {
+                Err(ErrorKind::Inconsistent.at(&[key], format!("{key} is {number}"), "give a finite number"))
+            }
             None => Ok(()),
         }
     }
 
     /// Checks that no moment of inertia exceeds the sum of the other two, as for any mass distribution.
-    fn check_body(&self) -> Result<(), ModelError> {
+    fn check_body(&self) -> Result<(), ScenarioError> {
         let [x, y, z] = self.inertia_kg_m2;
         let Some((largest, rest)) = [(x, y + z), (y, x + z), (z, x + y)].into_iter().find(|(one, rest)| one > rest)
         else {
             return Ok(());
         };
-        Err(refuse(
-            "inertia_kg_m2",
+        Err(ErrorKind::Inconsistent.at(
+            &["inertia_kg_m2"],
             format!("a moment of inertia of {largest:e} kg m^2 is more than the other two together, {rest:e} kg m^2"),
-            "reduce it: each is at most the sum of the other two".to_owned(),
+            "reduce it: each is at most the sum of the other two",
         ))
     }
-}
-
-fn refuse(key: &'static str, message: String, help: String) -> ModelError {
-    ModelError { key, message, help }
 }
 
 #[cfg(test)]
@@ -297,7 +284,7 @@ mod tests {
     #[test]
     fn every_built_in_model_is_valid_and_has_its_name() {
         for (name, text) in MODELS {
-            assert_eq!(read(text).expect("a model").name, name);
+            assert_eq!(read(name, text).expect("a model").name, name);
         }
     }
 
@@ -316,12 +303,13 @@ mod tests {
         ] {
             let wrong = text.replace(before, after);
             assert_ne!(wrong, text, "{before}");
-            let error = read(&wrong).expect_err(after);
+            let error = read("wrong.toml", &wrong).expect_err(after);
             assert!(error.message.contains(said), "{}", error.message);
             let key = after.split(' ').next().unwrap_or_default();
-            let line = &wrong[..error.span.end];
+            let span = error.place.expect("a place").span;
+            let line = &wrong[..span.end];
             let line = &line[line.rfind('\n').map_or(0, |end| end + 1)..];
-            assert!(error.span.start > 0 && (line.contains(key) || !after.contains('=')), "{after}: {line}");
+            assert!(span.start > 0 && (line.contains(key) || !after.contains('=')), "{after}: {line}");
         }
     }
 }

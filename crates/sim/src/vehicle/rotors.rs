@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn torques_beyond_the_rotors_are_scaled_and_raise_only_a_small_thrust() {
         for (name, text) in MODELS {
-            let model = read(text).expect("a model");
+            let model = read(name, text).expect("a model");
             let (mixer, weight_n) = (Mixer::new(&model).expect("independent rotors"), model.weight_n());
             let arm_m = model.rotor_positions_m[0][0].hypot(model.rotor_positions_m[0][1]);
             for (lift, direction) in [
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn thrusts_within_the_limits_are_exact() {
-        let model = read(MODELS[0].1).expect("a model");
+        let model = read(MODELS[0].0, MODELS[0].1).expect("a model");
         let mixer = Mixer::new(&model).expect("independent rotors");
         let (lift_n, torque_n_m) = (model.weight_n(), Vector3::new(2e-4, -1e-4, 1e-5));
         let thrusts_n = mixer.thrusts_n(lift_n, torque_n_m);

@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn built_in_tables_have_their_fingerprints() {
         for (name, text) in MODELS {
-            let model = read(text).expect("a model");
+            let model = read(name, text).expect("a model");
             let search = model.tracking.as_ref().and_then(|tracking| tracking.search.as_ref()).expect("a search");
             assert_eq!(search.model, model.fingerprint(), "tracking.search.model of {name}");
         }
@@ -197,7 +197,7 @@ mod tests {
             |search| search.margin *= 0.9,
             |search| search.dimensions = vec![2, 3],
         ];
-        let model = read(MODELS[0].1).expect("a model");
+        let model = read(MODELS[0].0, MODELS[0].1).expect("a model");
         assert!(model.tracking_search().is_some());
         let edited = |change: &dyn Fn(&mut Tracking)| {
             let mut edited = model.clone();
@@ -214,8 +214,8 @@ mod tests {
 
     #[test]
     fn acceleration_in_every_direction_is_limited_by_climb_or_sinking() {
-        let most = MODELS.map(|(_, text)| {
-            let model = read(text).expect("a model");
+        let most = MODELS.map(|(name, text)| {
+            let model = read(name, text).expect("a model");
             [false, true].map(|is_plane| (model.most_accel_m_s2(is_plane) * 100.0).round() / 100.0)
         });
         // 0.9 T/m - g climbs; 0.7 g sinks; sqrt((0.9 T/m)^2 - g^2) sideways.

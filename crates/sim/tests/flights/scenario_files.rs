@@ -169,7 +169,7 @@ fn what_a_flight_refuses_is_refused_at_its_key() {
     // A scenario in code has no schema before it.
     let mut scenario = read_builtin("pentagon", &[&obstacle("ball={radius_m=1}")]).expect("valid");
     scenario.obstacles[0].clearance_m = f64::INFINITY;
-    assert!(scenario.validate().is_err_and(|error| !error.fields.is_empty()));
+    assert!(scenario.validate().is_err_and(|error| !error.keys.is_empty()));
 }
 
 #[test]

@@ -200,16 +200,21 @@ fn fault_of_refusal(error: &ScenarioError, paths: &[String]) -> Option<String> {
         let table = [format!("{key}."), format!("{key}.1.")];
         paths.iter().any(|path| path == key || table.iter().any(|table| path.starts_with(table)))
     };
-    let unknown = error.fields.first().filter(|field| {
-        // The first formation is a table, the later ones are a list.
-        let is_of_leg = |key: &str| field.leg > 0 && is_key(&format!("leg.1{key}"));
-        !is_key(&field.key) && !field.key.strip_prefix("formation").is_some_and(is_of_leg)
+    // Entries of lists have the number 1 in the paths of the schema.
+    let first_entries = |key: &str| {
+        let parts = key.split('.').map(|part| if part.parse::<u64>().is_ok() { "1" } else { part });
+        parts.collect::<Vec<_>>().join(".")
+    };
+    let unknown = error.keys.first().filter(|key| {
+        let key = first_entries(key);
+        let list = key.trim_end_matches(".1");
+        !is_key(&key) && !is_key(list)
     });
     if error.place.is_none() {
         return Some(format!("without a place: {shown}"));
     }
-    if let Some(field) = unknown {
-        return Some(format!("the key {field} does not exist: {shown}"));
+    if let Some(key) = unknown {
+        return Some(format!("the key {key} does not exist: {shown}"));
     }
     if error.help.is_empty() {
         return Some(format!("without a remedy: {shown}"));

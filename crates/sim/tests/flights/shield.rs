@@ -361,7 +361,7 @@ fn scenarios_that_do_not_fit_the_shield_are_refused_with_place_value_and_remedy(
     let refused = |shield: &str| {
         let source = tautline_sim::scenario::Source::Text { name: "test".into(), text: format!("{SWAP}{shield}") };
         let error = Scenario::read(&source, &[]).expect_err(shield);
-        format!("{}: {error}", error.fields.first().map(ToString::to_string).unwrap_or_default())
+        format!("{}: {error}", error.keys.first().cloned().unwrap_or_default())
     };
     for (shield, place, says) in [
         ("[shield]\nbrake_m_s2 = 6", "shield.brake_m_s2", "must be at most 5.0000"),

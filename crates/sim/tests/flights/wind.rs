@@ -288,7 +288,7 @@ fn a_wrong_wind_is_refused_at_its_place_with_a_remedy() {
         let sets = [&["vehicle.drag_per_s=0.3", "time.duration_s=10"], sets].concat();
         let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
         let error = Scenario::read(&Source::Builtin("pentagon".to_owned()), &overrides).expect_err(sets[2]);
-        assert!(!error.help.is_empty() && (error.place.is_some() || !error.fields.is_empty()), "{error}");
+        assert!(!error.help.is_empty() && (error.place.is_some() || !error.keys.is_empty()), "{error}");
         error
     };
     let gust = |keys: &str| format!("wind.gust=[{{at_s = 1.0, rise_s = 1.0, velocity_m_s = [1.0, 0.0], {keys}}}]");

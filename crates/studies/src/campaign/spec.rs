@@ -112,14 +112,20 @@ impl Spec {
             let remedy = "a specification is `key = value` lines below `[table]` headers";
             failed("campaign/specification", &problem, remedy, error.span().unwrap_or_default())
         };
-        let misfit = |code| move |(error, span): (ScenarioError, _)| failed(code, &error.message, &error.help, span);
+        let misfit = |code| {
+            move |error: ScenarioError| {
+                let failure = Failure::input(code, &error.message, &error.help);
+                error.place.iter().fold(failure, |failure, place| failure.at(place))
+            }
+        };
+        let locate = |span| Place::new(name, text, span);
         let table = DeTable::parse(text).map_err(not_toml)?.into_inner();
         let mut file = Spanned::new(0..0, DeValue::Table(table));
-        SPEC.check("specification", &mut file).map_err(misfit("campaign/specification"))?;
+        SPEC.check("specification", &mut file, &locate).map_err(misfit("campaign/specification"))?;
         if let DeValue::Table(file) = file.get_mut()
             && let Some(DeValue::Table(vary)) = file.get_mut("vary").map(Spanned::get_mut)
         {
-            check_variations("", vary).map_err(misfit("campaign/variation"))?;
+            check_variations("", vary, &locate).map_err(misfit("campaign/variation"))?;
         }
         let source = Source { name: name.to_owned(), text: text.to_owned() };
         // The schema admits only what serde reads. An error of serde is a defect of the schema.
@@ -221,15 +227,19 @@ impl Spec {
 }
 
 /// Checks each variation of `[vary]`. `above` is the dotted key of the table.
-fn check_variations(above: &str, table: &mut DeTable<'_>) -> Result<(), (ScenarioError, Range<usize>)> {
+fn check_variations(
+    above: &str,
+    table: &mut DeTable<'_>,
+    locate: &dyn Fn(Range<usize>) -> Place,
+) -> Result<(), ScenarioError> {
     for (name, value) in table.iter_mut() {
         let key = if above.is_empty() { name.get_ref().to_string() } else { format!("{above}.{}", name.get_ref()) };
         match value.get_mut() {
             DeValue::String(word) if word == BY_RUN => {}
             DeValue::Table(below) if !below.is_empty() && !is_variation(below.keys().map(|name| &**name.get_ref())) => {
-                check_variations(&key, below)?;
+                check_variations(&key, below, locate)?;
             }
-            _ => VARIATION.check(&format!("vary.{key}"), value)?,
+            _ => VARIATION.check(&format!("vary.{key}"), value, locate)?,
         }
     }
     Ok(())

@@ -19,7 +19,7 @@ use tautline_sim::vehicle::{self, Airframe, Fleet, MODELS, Model, Quadrotor, Sta
 /// Returns a built-in model.
 fn model(name: &str) -> Model {
     let (_, text) = MODELS.iter().find(|(known, _)| *known == name).expect("a built-in model");
-    vehicle::read(text).expect("a right model")
+    vehicle::read(name, text).expect("a right model")
 }
 
 /// Returns a model without drag.

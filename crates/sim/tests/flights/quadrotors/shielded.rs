@@ -195,7 +195,7 @@ fn a_table_that_its_search_contradicts_is_refused() {
             Some((name, _)) if name == key => format!("{key} = {value}"),
             _ => line.to_owned(),
         });
-        let error = vehicle::read(&lines.collect::<Vec<_>>().join("\n")).expect_err(key);
+        let error = vehicle::read("model.toml", &lines.collect::<Vec<_>>().join("\n")).expect_err(key);
         assert!(error.message.contains(says), "{key} of {error_m}: {}", error.message);
     }
 }
