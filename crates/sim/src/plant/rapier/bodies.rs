@@ -1,42 +1,25 @@
 //! Points: rigid bodies without rotation that execute commanded accelerations.
 
-use std::sync::Arc;
-
 use nalgebra::Vector3;
-use rapier3d::prelude::{ColliderSet, LockedAxes, RigidBodyBuilder, RigidBodyHandle, RigidBodySet, Vector};
-
-use super::proximity::{Maker, Proximity};
-use super::world::{
-    Engine, empty_world, first_in_contact, first_not_finite, from_engine, hull, hull_contacts, keep_out,
-    keep_out_contacts, obstacle, to_engine,
+use rapier3d::prelude::{
+    ColliderSet, LockedAxes, PhysicsWorld, RigidBody, RigidBodyBuilder, RigidBodyHandle, RigidBodySet, Vector,
 };
+
+use super::mover::{Body, Mover};
+use super::world::{from_engine, hull, keep_out, to_engine};
 use crate::plant::{Air, FreeSteps, HullContact, Plant, PlantError, StepPath};
 use crate::scenario::{Scenario, Space};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 
 /// Swarm of rigid bodies, one per vehicle, in vehicle order.
+#[derive(Clone)]
 pub(super) struct Bodies {
-    engine: Engine,
-    /// Positions from the engine's origin \[m\]. The bodies of the engine follow when it steps.
-    positions: Vec<Vector>,
-    /// Velocities, as the engine has them \[m/s\].
-    velocities: Vec<Vector>,
-    /// Inverse mass along each axis, 0 along a locked one \[1/kg\].
-    inverse_masses: Vec<Vector>,
-    proximity: Proximity,
-    /// Whether the last step was free: the engine did not step.
-    was_free: bool,
-    /// Positions and velocities from which the engine repeats a free step, then those of the free step.
-    compared: (Vec<Vector>, Vec<Vector>),
+    mover: Mover<Point>,
     /// Accelerations held over the step, with the push of the wind at its beginning \[m/s^2\].
     held: Rows,
     /// Wind, if any.
     air: Option<Air>,
-    /// Velocities of the last drift before contacts changed them \[m/s\].
-    drift_m_s: Rows,
-    /// Positions at the beginning of the last drift, from the engine's origin \[m\].
-    began_m: Rows,
     /// Length of a drift whose second half kick is pending \[s\]; 0 for a completed state.
     drifted_s: f64,
     /// Origin of the engine's coordinates: the centre of the start. The engine then resolves the extent of the swarm
@@ -47,6 +30,45 @@ pub(super) struct Bodies {
     a22_per_s: f64,
     /// Whether z is locked.
     is_flat: bool,
+}
+
+/// State of a body without rotation.
+#[derive(Clone)]
+struct Point {
+    /// Position from the engine's origin \[m\].
+    position: Vector,
+    /// Velocity, as the engine has it \[m/s\].
+    velocity: Vector,
+    /// Force over the step \[N\].
+    force: Vector,
+    /// Inverse mass along each axis, 0 along a locked one \[1/kg\].
+    inverse_mass: Vector,
+}
+
+impl Body for Point {
+    fn write(&self, body: &mut RigidBody) {
+        if body.translation() != self.position {
+            body.set_translation(self.position, true);
+        }
+        body.set_linvel(self.velocity, true);
+        body.reset_forces(false);
+        body.add_force(self.force, true);
+    }
+
+    fn read(&mut self, body: &RigidBody) {
+        (self.position, self.velocity) = (body.translation(), body.linvel());
+    }
+
+    fn drift_freely(&mut self, dt_s: f64) -> Option<Vector> {
+        self.velocity += (self.force + Vector::ZERO) * self.inverse_mass * dt_s;
+        let moved = self.velocity * dt_s;
+        self.position += moved;
+        self.position.is_finite().then_some(moved)
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        bits(self.position) == bits(other.position) && bits(self.velocity) == bits(other.velocity)
+    }
 }
 
 impl Bodies {
@@ -61,32 +83,20 @@ impl Bodies {
             keep_out_m: scenario.metric().shortest_m(scenario.delta_m),
             space: scenario.space,
         };
-        let (positions, velocities) = (vehicles.positions.clone(), vehicles.velocities.clone());
-        let inverse_masses = vehicles.inverse_masses();
-        let obstacles: Arc<[_]> = scenario.obstacles.iter().map(|solid| obstacle(solid, origin_m)).collect();
-        let solids = Arc::clone(&obstacles);
-        let create = move || {
-            let mut world = empty_world();
-            for i in 0..vehicles.positions.len() {
-                vehicles.insert(i, &mut world.bodies, &mut world.colliders);
-            }
-            for obstacle in &*solids {
-                world.colliders.insert(obstacle.clone());
-            }
-            world
+        let point = |(i, inverse_mass)| Point {
+            position: vehicles.positions[i],
+            velocity: vehicles.velocities[i],
+            force: Vector::ZERO,
+            inverse_mass,
+        };
+        let points = vehicles.inverse_masses().into_iter().enumerate().map(point).collect();
+        let insert = move |i: usize, world: &mut PhysicsWorld| {
+            vehicles.insert(i, &mut world.bodies, &mut world.colliders);
         };
         Self {
-            engine: Engine::new(create),
-            positions,
-            velocities,
-            inverse_masses,
-            proximity: Proximity::new(scenario, obstacles),
-            was_free: false,
-            compared: (Vec::new(), Vec::new()),
+            mover: Mover::new(scenario, points, origin_m, insert),
             held: Rows::zeros(scenario.count()),
             air: Air::of(scenario),
-            drift_m_s: Rows::zeros(scenario.count()),
-            began_m: Rows::zeros(scenario.count()),
             drifted_s: 0.0,
             origin_m,
             mass_kg: scenario.mass_kg.clone(),
@@ -113,140 +123,52 @@ impl Bodies {
     /// Completes a pending drift with the held command, and sets the velocities from which the engine starts.
     fn begin_drift(&mut self, dt_s: f64) {
         let (completing, half_decay) = (self.half_decay(self.drifted_s), self.half_decay(dt_s));
-        for (i, velocity) in self.velocities.iter_mut().enumerate() {
+        let Mover { bodies, drift_m_s, began_m, .. } = &mut self.mover;
+        for (i, point) in bodies.iter_mut().enumerate() {
             let held_m_s2 = row(&self.held, i);
-            let velocity_m_s = (from_engine(*velocity) + 0.5 * self.drifted_s * held_m_s2) * completing;
-            let drift_m_s = velocity_m_s * half_decay + 0.5 * dt_s * held_m_s2;
-            set_row(&mut self.drift_m_s, i, drift_m_s);
-            set_row(&mut self.began_m, i, from_engine(self.positions[i]));
-            set(velocity, to_engine(drift_m_s - dt_s * held_m_s2));
+            let velocity_m_s = (from_engine(point.velocity) + 0.5 * self.drifted_s * held_m_s2) * completing;
+            let drifting_m_s = velocity_m_s * half_decay + 0.5 * dt_s * held_m_s2;
+            set_row(drift_m_s, i, drifting_m_s);
+            set_row(began_m, i, from_engine(point.position));
+            set(&mut point.velocity, to_engine(drifting_m_s - dt_s * held_m_s2));
+            point.force = self.mass_kg[i] * to_engine(held_m_s2);
         }
-    }
-
-    /// Moves bodies without contacts, with the operations of the engine.
-    fn drift_freely(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        let mut longest = 0.0_f64;
-        for (i, (position, velocity)) in self.positions.iter_mut().zip(&mut self.velocities).enumerate() {
-            let force = self.mass_kg[i] * to_engine(row(&self.held, i)) + Vector::ZERO;
-            *velocity += force * self.inverse_masses[i] * dt_s;
-            let moved = *velocity * dt_s;
-            *position += moved;
-            if !position.is_finite() {
-                return Err(PlantError::NotFinite { vehicle: i });
-            }
-            longest = longest.max(moved.length_squared());
-        }
-        self.proximity.note_move(longest.sqrt());
-        Ok(())
-    }
-
-    /// Moves bodies with the engine.
-    fn drift_in_engine(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        let Self { positions, velocities, held, mass_kg, .. } = self;
-        let world = self.engine.step(dt_s, |i, body| {
-            if body.translation() != positions[i] {
-                body.set_translation(positions[i], true);
-            }
-            body.set_linvel(velocities[i], true);
-            body.reset_forces(false);
-            body.add_force(to_engine(row(held, i)) * mass_kg[i], true);
-        });
-        if let Some(vehicle) = first_not_finite(world) {
-            return Err(PlantError::NotFinite { vehicle });
-        }
-        for ((_, body), (position, velocity)) in world.bodies.iter().zip(positions.iter_mut().zip(velocities)) {
-            (*position, *velocity) = (body.translation(), body.linvel());
-        }
-        Ok(())
-    }
-
-    /// Moves bodies without contacts, and again with the engine. The results must be the same.
-    fn drift_in_both(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        self.compared.0.clone_from(&self.positions);
-        self.compared.1.clone_from(&self.velocities);
-        self.drift_freely(dt_s)?;
-        std::mem::swap(&mut self.positions, &mut self.compared.0);
-        std::mem::swap(&mut self.velocities, &mut self.compared.1);
-        self.drift_in_engine(dt_s)?;
-        let is_same = |(engine, free): (&Vector, &Vector)| bits(*engine) == bits(*free);
-        let differs = |i: &usize| {
-            !is_same((&self.positions[*i], &self.compared.0[*i]))
-                || !is_same((&self.velocities[*i], &self.compared.1[*i]))
-        };
-        if let Some(vehicle) = (0..self.positions.len()).find(differs) {
-            return Err(PlantError::EngineDiffers { vehicle });
-        }
-        if let Some(vehicle) = self.engine.world().and_then(first_in_contact) {
-            return Err(PlantError::EngineDiffers { vehicle });
-        }
-        Ok(())
     }
 
     /// Returns each velocity \[m/s\], completed by the second half kick of the held acceleration if that is pending.
     fn velocities_m_s(&self) -> impl Iterator<Item = Vector3<f64>> {
         let half_decay = self.half_decay(self.drifted_s);
-        self.velocities
-            .iter()
-            .enumerate()
-            .map(move |(i, &drift)| (from_engine(drift) + 0.5 * self.drifted_s * row(&self.held, i)) * half_decay)
+        self.mover.bodies.iter().enumerate().map(move |(i, point)| {
+            (from_engine(point.velocity) + 0.5 * self.drifted_s * row(&self.held, i)) * half_decay
+        })
     }
 }
 
 #[cfg(test)]
 impl Bodies {
-    pub(super) fn proximity(&mut self) -> &mut Proximity {
-        &mut self.proximity
+    pub(super) fn proximity(&mut self) -> &mut super::proximity::Proximity {
+        &mut self.mover.proximity
     }
 
     pub(super) fn was_free(&self) -> bool {
-        self.was_free
+        self.mover.was_free()
     }
 
     /// Changes the last bit of the inverse mass of a vehicle in free steps.
     pub(super) fn change_inverse_mass(&mut self, vehicle: usize) {
-        self.inverse_masses[vehicle].x = self.inverse_masses[vehicle].x.next_up();
-        self.inverse_masses[vehicle].y = self.inverse_masses[vehicle].y.next_up();
-    }
-}
-
-impl Clone for Bodies {
-    fn clone(&self) -> Self {
-        Self {
-            engine: self.engine.clone(),
-            positions: self.positions.clone(),
-            velocities: self.velocities.clone(),
-            inverse_masses: self.inverse_masses.clone(),
-            proximity: self.proximity.clone(),
-            compared: (Vec::new(), Vec::new()),
-            held: self.held.clone(),
-            air: self.air.clone(),
-            drift_m_s: self.drift_m_s.clone(),
-            began_m: self.began_m.clone(),
-            mass_kg: self.mass_kg.clone(),
-            ..*self
-        }
+        let inverse_mass = &mut self.mover.bodies[vehicle].inverse_mass;
+        (inverse_mass.x, inverse_mass.y) = (inverse_mass.x.next_up(), inverse_mass.y.next_up());
     }
 }
 
 impl Plant for Bodies {
     fn count(&self) -> usize {
-        self.positions.len()
+        self.mover.bodies.len()
     }
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
         self.begin_drift(dt_s);
-        let maker = self.proximity.begin_step(&self.began_m);
-        self.was_free = maker == Maker::FreeStep;
-        match maker {
-            Maker::Engine => self.drift_in_engine(dt_s)?,
-            Maker::FreeStep => {
-                if self.proximity.trusts_free_steps() {
-                    self.engine.discard();
-                }
-                self.drift_freely(dt_s)?;
-            }
-            Maker::Both => self.drift_in_both(dt_s)?,
-        }
+        self.mover.drift(dt_s)?;
         self.drifted_s = dt_s;
         if let Some(air) = &mut self.air {
             air.advance(dt_s);
@@ -264,19 +186,19 @@ impl Plant for Bodies {
         self.hold();
         if self.drifted_s > 0.0 {
             let half_decay = self.half_decay(self.drifted_s);
-            for (i, velocity) in self.velocities.iter_mut().enumerate() {
-                let drift_m_s = from_engine(*velocity);
+            for (i, point) in self.mover.bodies.iter_mut().enumerate() {
+                let drift_m_s = from_engine(point.velocity);
                 let completed = to_engine((drift_m_s + 0.5 * self.drifted_s * row(&self.held, i)) * half_decay);
                 set_row(&mut state.velocities_m_s, i, from_engine(completed));
-                set(velocity, completed);
+                set(&mut point.velocity, completed);
             }
             self.drifted_s = 0.0;
         }
     }
 
     fn observe(&self, swarm: &mut Swarm) {
-        for (i, &position) in self.positions.iter().enumerate() {
-            set_row(&mut swarm.positions_m, i, self.origin_m + from_engine(position));
+        for (i, point) in self.mover.bodies.iter().enumerate() {
+            set_row(&mut swarm.positions_m, i, self.origin_m + from_engine(point.position));
         }
         for (i, velocity_m_s) in self.velocities_m_s().enumerate() {
             set_row(&mut swarm.velocities_m_s, i, velocity_m_s);
@@ -284,11 +206,11 @@ impl Plant for Bodies {
     }
 
     fn restore(&mut self, swarm: &Swarm) {
-        for i in 0..self.count() {
-            set(&mut self.positions[i], to_engine(row(&swarm.positions_m, i) - self.origin_m));
-            set(&mut self.velocities[i], to_engine(row(&swarm.velocities_m_s, i)));
+        for (i, point) in self.mover.bodies.iter_mut().enumerate() {
+            set(&mut point.position, to_engine(row(&swarm.positions_m, i) - self.origin_m));
+            set(&mut point.velocity, to_engine(row(&swarm.velocities_m_s, i)));
         }
-        self.proximity.forget();
+        self.mover.proximity.forget();
         self.drifted_s = 0.0;
         if let Some(air) = &mut self.air {
             air.undo();
@@ -311,25 +233,19 @@ impl Plant for Bodies {
     }
 
     fn allow_free_steps(&mut self, free: FreeSteps) {
-        self.proximity.allow_free_steps(free);
+        self.mover.proximity.allow_free_steps(free);
     }
 
     fn engine_steps(&self) -> Option<u64> {
-        Some(self.proximity.engine_steps())
+        Some(self.mover.proximity.engine_steps())
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
-        if self.was_free {
-            pairs.extend_from_slice(self.proximity.overlaps());
-        } else if let Some(world) = self.engine.world() {
-            keep_out_contacts(world, pairs);
-        }
+        self.mover.keep_out_contacts(pairs);
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
-        if let Some(world) = self.engine.world().filter(|_| !self.was_free) {
-            hull_contacts(world, &self.began_m, &self.drift_m_s, contacts);
-        }
+        self.mover.hull_contacts(contacts);
     }
 }
 

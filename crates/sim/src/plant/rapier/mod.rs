@@ -57,6 +57,7 @@
 //! overlaps from the distances of the pairs. The engine is created for its first step, and dropped after contacts.
 
 mod bodies;
+mod mover;
 mod proximity;
 mod quadrotors;
 mod world;

@@ -1,16 +1,12 @@
 //! Quadrotors: rotating rigid bodies lifted by rotors.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use rapier3d::prelude::{MassProperties, Real, RigidBody, RigidBodyBuilder, Rotation, Vector};
+use rapier3d::prelude::{MassProperties, PhysicsWorld, Real, RigidBody, RigidBodyBuilder, Rotation, Vector};
 
-use super::proximity::{Maker, Proximity};
-use super::world::{
-    Engine, empty_world, first_in_contact, first_not_finite, from_engine, hull, hull_contacts, keep_out,
-    keep_out_contacts, obstacle, to_engine,
-};
+use super::mover::{Body, Mover};
+use super::world::{from_engine, hull, keep_out, to_engine};
 use crate::plant::{FreeSteps, HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
 use crate::sim::Stopwatch;
@@ -23,21 +19,12 @@ const HULL_FRICTION: Real = 0.5;
 
 /// Swarm of quadrotors, one body per vehicle, in vehicle order. The engine moves and turns the bodies and detects
 /// collisions; the fleet computes forces, torques and the velocities around the engine's step.
+#[derive(Clone)]
 pub(super) struct Fliers {
-    engine: Engine,
-    /// Poses and velocities, as the engine has them. The bodies of the engine follow when it steps.
-    bodies: Vec<Body>,
-    proximity: Proximity,
-    /// Whether the last step was free: the engine did not step.
-    was_free: bool,
-    /// Bodies from which the engine repeats a free step, then those after the free step.
-    compared: Vec<Body>,
+    mover: Mover<RotatingBody>,
     fleet: Fleet,
     /// First half of the current step.
     drifts: Vec<Drift>,
-    /// Velocities of the step and positions at its beginning, from the engine's origin, for collisions.
-    drift_m_s: Rows,
-    began_m: Rows,
     origin_m: Vector3<f64>,
     /// Wall-clock time spent outside the engine.
     airframe: Duration,
@@ -45,8 +32,8 @@ pub(super) struct Fliers {
 }
 
 /// State of a body of the engine.
-#[derive(Clone, Copy)]
-struct Body {
+#[derive(Clone)]
+struct RotatingBody {
     /// Position from the engine's origin \[m\].
     position: Vector,
     rotation: Rotation,
@@ -56,25 +43,36 @@ struct Body {
     angular: Vector,
 }
 
-impl Body {
-    fn of(body: &RigidBody) -> Self {
-        let (position, rotation) = (body.translation(), *body.rotation());
-        Self { position, rotation, linear: body.linvel(), angular: body.angvel() }
+impl Body for RotatingBody {
+    fn write(&self, body: &mut RigidBody) {
+        if (body.translation(), *body.rotation()) != (self.position, self.rotation) {
+            body.set_translation(self.position, true);
+            body.set_rotation(self.rotation, true);
+        }
+        body.set_linvel(self.linear, true);
+        body.set_angvel(self.angular, true);
     }
 
-    /// Moves the body without contacts, with the operations of the engine. Returns the way.
-    fn drift_freely(&mut self, dt_s: f64) -> Vector {
+    fn read(&mut self, body: &RigidBody) {
+        (self.position, self.rotation) = (body.translation(), *body.rotation());
+        (self.linear, self.angular) = (body.linvel(), body.angvel());
+    }
+
+    fn drift_freely(&mut self, dt_s: f64) -> Option<Vector> {
         let half_turn = self.angular * (dt_s * 0.5);
         let turned = Rotation::from_xyzw(half_turn.x, half_turn.y, half_turn.z, 1.0) * self.rotation;
         self.rotation = turned.normalize();
         let moved = self.linear * dt_s;
         self.position += moved;
-        moved
+        (self.position.is_finite() && self.rotation.is_finite()).then_some(moved)
     }
 
-    fn bits(&self) -> ([[u64; 3]; 3], [u64; 4]) {
-        let vectors = [self.position, self.linear, self.angular];
-        (vectors.map(|vector| vector.to_array().map(f64::to_bits)), self.rotation.to_array().map(f64::to_bits))
+    fn is_same(&self, other: &Self) -> bool {
+        let bits = |body: &Self| {
+            let vectors = [body.position, body.linear, body.angular];
+            (vectors.map(|vector| vector.to_array().map(f64::to_bits)), body.rotation.to_array().map(f64::to_bits))
+        };
+        bits(self) == bits(other)
     }
 }
 
@@ -85,7 +83,7 @@ impl Fliers {
         let model = fleet.dynamics.model();
         let mass = MassProperties::new(Vector::ZERO, model.mass_kg, to_engine(fleet.dynamics.inertia_kg_m2()));
         let (hull_radius_m, keep_out_m) = (model.hull_radius_m, scenario.metric().shortest_m(scenario.delta_m));
-        let starts = fleet.states.iter().map(|state| Body {
+        let starts = fleet.states.iter().map(|state| RotatingBody {
             position: to_engine(state.position_m - origin_m),
             rotation: rotation(&state.attitude),
             linear: to_engine(state.velocity_m_s),
@@ -93,42 +91,26 @@ impl Fliers {
         });
         let starts: Vec<_> = starts.collect();
         let bodies = starts.clone();
-        let obstacles: Arc<[_]> = scenario.obstacles.iter().map(|solid| obstacle(solid, origin_m)).collect();
-        let solids = Arc::clone(&obstacles);
-        let create = move || {
-            let mut world = empty_world();
-            for (i, start) in starts.iter().enumerate() {
-                let body = RigidBodyBuilder::dynamic()
-                    .translation(start.position)
-                    .linvel(start.linear)
-                    .additional_mass_properties(mass)
-                    .gyroscopic_forces_enabled(false)
-                    .allow_fast_rotation(true)
-                    .can_sleep(false);
-                let handle = world.bodies.insert(body);
-                world.bodies[handle].set_rotation(start.rotation, true);
-                let hull = hull(hull_radius_m, i).density(0.0).friction(HULL_FRICTION);
-                for collider in [hull, keep_out(keep_out_m, i)] {
-                    world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
-                }
-                world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
+        let insert = move |i: usize, world: &mut PhysicsWorld| {
+            let body = RigidBodyBuilder::dynamic()
+                .translation(starts[i].position)
+                .linvel(starts[i].linear)
+                .additional_mass_properties(mass)
+                .gyroscopic_forces_enabled(false)
+                .allow_fast_rotation(true)
+                .can_sleep(false);
+            let handle = world.bodies.insert(body);
+            world.bodies[handle].set_rotation(starts[i].rotation, true);
+            let hull = hull(hull_radius_m, i).density(0.0).friction(HULL_FRICTION);
+            for collider in [hull, keep_out(keep_out_m, i)] {
+                world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
             }
-            for obstacle in &*solids {
-                world.colliders.insert(obstacle.clone());
-            }
-            world
+            world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
         };
-        let (drift_m_s, began_m) = (Rows::zeros(count), Rows::zeros(count));
         Self {
-            engine: Engine::new(create),
-            bodies,
-            proximity: Proximity::new(scenario, obstacles),
-            was_free: false,
-            compared: Vec::new(),
+            mover: Mover::new(scenario, bodies, origin_m, insert),
             fleet,
             drifts: Vec::with_capacity(count),
-            drift_m_s,
-            began_m,
             origin_m,
             airframe: Duration::ZERO,
             stopwatch: Stopwatch { is_on: false },
@@ -138,71 +120,21 @@ impl Fliers {
     /// Applies half of the kick and sets the velocities for the drift.
     fn begin(&mut self, dt_s: f64) {
         self.drifts.clear();
-        for (i, body) in self.bodies.iter_mut().enumerate() {
+        let Mover { bodies, drift_m_s, began_m, .. } = &mut self.mover;
+        for (i, body) in bodies.iter_mut().enumerate() {
             let drift = self.fleet.dynamics.begin_step(&self.fleet.states[i], self.fleet.wrench(i), dt_s);
-            set_row(&mut self.drift_m_s, i, drift.velocity_m_s);
-            set_row(&mut self.began_m, i, from_engine(body.position));
+            set_row(drift_m_s, i, drift.velocity_m_s);
+            set_row(began_m, i, from_engine(body.position));
             body.linear = to_engine(drift.velocity_m_s);
             body.angular = to_engine(drift.turn_rad_s);
             self.drifts.push(drift);
         }
     }
 
-    /// Moves and turns the bodies without contacts.
-    fn drift_freely(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        let mut longest = 0.0_f64;
-        for (vehicle, body) in self.bodies.iter_mut().enumerate() {
-            let moved = body.drift_freely(dt_s);
-            if !(body.position.is_finite() && body.rotation.is_finite()) {
-                return Err(PlantError::NotFinite { vehicle });
-            }
-            longest = longest.max(moved.length_squared());
-        }
-        self.proximity.note_move(longest.sqrt());
-        Ok(())
-    }
-
-    /// Moves and turns the bodies with the engine.
-    fn drift_in_engine(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        let Self { bodies, .. } = self;
-        let world = self.engine.step(dt_s, |i, body| {
-            let state = &bodies[i];
-            if (body.translation(), *body.rotation()) != (state.position, state.rotation) {
-                body.set_translation(state.position, true);
-                body.set_rotation(state.rotation, true);
-            }
-            body.set_linvel(state.linear, true);
-            body.set_angvel(state.angular, true);
-        });
-        if let Some(vehicle) = first_not_finite(world) {
-            return Err(PlantError::NotFinite { vehicle });
-        }
-        for ((_, body), state) in world.bodies.iter().zip(bodies) {
-            *state = Body::of(body);
-        }
-        Ok(())
-    }
-
-    /// Moves and turns the bodies without contacts, and again with the engine. The results must be the same.
-    fn drift_in_both(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        self.compared.clone_from(&self.bodies);
-        self.drift_freely(dt_s)?;
-        std::mem::swap(&mut self.bodies, &mut self.compared);
-        self.drift_in_engine(dt_s)?;
-        let mut both = self.bodies.iter().zip(&self.compared);
-        if let Some(vehicle) = both.position(|(engine, free)| engine.bits() != free.bits()) {
-            return Err(PlantError::EngineDiffers { vehicle });
-        }
-        if let Some(vehicle) = self.engine.world().and_then(first_in_contact) {
-            return Err(PlantError::EngineDiffers { vehicle });
-        }
-        Ok(())
-    }
-
     /// Takes the poses after the drift and applies the other half of the kick.
     fn end(&mut self, dt_s: f64) {
         let lag = self.fleet.dynamics.rotor_lag(dt_s);
-        for (i, (body, drift)) in self.bodies.iter().zip(&mut self.drifts).enumerate() {
+        for (i, (body, drift)) in self.mover.bodies.iter().zip(&mut self.drifts).enumerate() {
             let commanded_rpm = self.fleet.commanded_rpm(i);
             let state = &mut self.fleet.states[i];
             state.position_m = self.origin_m + from_engine(body.position);
@@ -225,26 +157,7 @@ impl Fliers {
 #[cfg(test)]
 impl Fliers {
     pub(super) fn was_free(&self) -> bool {
-        self.was_free
-    }
-}
-
-impl Clone for Fliers {
-    fn clone(&self) -> Self {
-        Self {
-            engine: self.engine.clone(),
-            bodies: self.bodies.clone(),
-            proximity: self.proximity.clone(),
-            was_free: self.was_free,
-            compared: Vec::new(),
-            fleet: self.fleet.clone(),
-            drifts: self.drifts.clone(),
-            drift_m_s: self.drift_m_s.clone(),
-            began_m: self.began_m.clone(),
-            origin_m: self.origin_m,
-            airframe: self.airframe,
-            stopwatch: self.stopwatch,
-        }
+        self.mover.was_free()
     }
 }
 
@@ -256,7 +169,7 @@ impl Quadrotors for Fliers {
 
 impl Plant for Fliers {
     fn count(&self) -> usize {
-        self.bodies.len()
+        self.mover.bodies.len()
     }
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
@@ -265,18 +178,7 @@ impl Plant for Fliers {
         self.fleet.run_attitude();
         self.begin(dt_s);
         self.airframe += began.elapsed();
-        let maker = self.proximity.begin_step(&self.began_m);
-        self.was_free = maker == Maker::FreeStep;
-        match maker {
-            Maker::Engine => self.drift_in_engine(dt_s)?,
-            Maker::FreeStep => {
-                if self.proximity.trusts_free_steps() {
-                    self.engine.discard();
-                }
-                self.drift_freely(dt_s)?;
-            }
-            Maker::Both => self.drift_in_both(dt_s)?,
-        }
+        self.mover.drift(dt_s)?;
         let began = self.stopwatch.start();
         self.end(dt_s);
         self.fleet.advance_clock(dt_s);
@@ -296,33 +198,28 @@ impl Plant for Fliers {
 
     fn restore(&mut self, _swarm: &Swarm) {
         self.fleet.restore_state();
-        for (i, body) in self.bodies.iter_mut().enumerate() {
-            body.position = to_engine(row(&self.began_m, i));
+        let Mover { bodies, began_m, .. } = &mut self.mover;
+        for (i, body) in bodies.iter_mut().enumerate() {
+            body.position = to_engine(row(began_m, i));
             body.rotation = rotation(&self.fleet.states[i].attitude);
         }
-        self.proximity.forget();
+        self.mover.proximity.forget();
     }
 
     fn allow_free_steps(&mut self, free: FreeSteps) {
-        self.proximity.allow_free_steps(free);
+        self.mover.proximity.allow_free_steps(free);
     }
 
     fn engine_steps(&self) -> Option<u64> {
-        Some(self.proximity.engine_steps())
+        Some(self.mover.proximity.engine_steps())
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
-        if self.was_free {
-            pairs.extend_from_slice(self.proximity.overlaps());
-        } else if let Some(world) = self.engine.world() {
-            keep_out_contacts(world, pairs);
-        }
+        self.mover.keep_out_contacts(pairs);
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
-        if let Some(world) = self.engine.world().filter(|_| !self.was_free) {
-            hull_contacts(world, &self.began_m, &self.drift_m_s, contacts);
-        }
+        self.mover.hull_contacts(contacts);
     }
 
     fn airframe_time(&self) -> Duration {
