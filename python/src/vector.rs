@@ -212,7 +212,7 @@ impl VectorSimulation {
             Workers::One => Workers::One,
             Workers::Own(pool) => Workers::Own(ProcessPool::new(pool.threads())),
         };
-        Self::of(py, self.with(py, |worlds, _| worlds.copied())?, threads)
+        Self::of(py, self.with(py, |worlds, _| worlds.clone())?, threads)
     }
 
     /// Largest number of worlds of a scenario.

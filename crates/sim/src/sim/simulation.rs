@@ -207,13 +207,18 @@ impl Simulation {
         if commands.nrows() != count || first_row_beyond(commands, MAX_COMMAND_M_S2).is_some() {
             return Err(SimError::Commands { expected: count, found: commands.nrows() });
         }
+        self.step_with_checked(commands);
+        Ok(())
+    }
+
+    /// Flies one step like [`Simulation::step_with`], with accelerations that were checked.
+    pub(super) fn step_with_checked(&mut self, commands: &Rows) {
         if self.ending.is_none() {
             self.overruled = true;
             let took = self.take_commands(commands);
             self.end_if_over(took);
         }
         self.step_or_end();
-        Ok(())
     }
 
     /// Applies accelerations from outside at the present instant, after the shield if there is one.

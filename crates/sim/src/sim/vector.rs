@@ -51,6 +51,9 @@ const VEHICLE_STEPS_AT_ONCE: u64 = 100_000;
 /// assert!(states.positions_m.len() == 45 && worlds.world(2).time_s() == 1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// A clone is independent and continues with the same bits.
+#[derive(Clone)]
 pub struct VectorSimulation {
     starts: Starts,
     worlds: Vec<World>,
@@ -182,6 +185,7 @@ pub enum VectorError {
 }
 
 /// One world.
+#[derive(Clone)]
 struct World {
     seed: u64,
     simulation: Simulation,
@@ -189,8 +193,6 @@ struct World {
     commands: Rows,
     /// Whether the present call reset this world, which then does not fly.
     rests: bool,
-    /// Error of the present call.
-    failure: Option<VectorError>,
 }
 
 /// Source of new simulations.
@@ -221,8 +223,10 @@ impl GivenStarts<'_> {
     }
 }
 
+/// Found seed with the simulation at its start, or the error of a search.
+type Started = Result<(u64, Simulation), VectorError>;
+
 /// Search for a seed with a valid start.
-#[derive(Clone, Copy)]
 struct Search<'a> {
     /// States of all worlds at the start, if they are given.
     given: Option<GivenStarts<'a>>,
@@ -234,14 +238,6 @@ struct Search<'a> {
     goes_on: bool,
     /// Whether every seed is tried, not only those of the world.
     takes_every: bool,
-}
-
-/// Found seed with the simulation at its start, or the error of a search.
-type Started = Result<(u64, Simulation), VectorError>;
-
-/// Search in progress.
-struct Attempt<'a> {
-    search: Search<'a>,
     /// Next seed to try.
     seed: u64,
     /// Number of tried seeds.
@@ -251,19 +247,32 @@ struct Attempt<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Returns the search of a choice. `next` is the seed after the present one of the world.
-    const fn of(choice: SeedChoice, world: usize, next: u64) -> Self {
+    /// Returns the search of a choice. `next` is the seed after the present one of the world. No other seed changes
+    /// given states.
+    fn of(choice: SeedChoice, world: usize, next: u64, given: Option<GivenStarts<'a>>) -> Self {
         let (first, goes_on) = match choice {
             SeedChoice::Next => (next, true),
             SeedChoice::From(first) => (first, true),
             SeedChoice::Exactly(first) => (first, false),
         };
-        Self { given: None, world, first, goes_on, takes_every: matches!(choice, SeedChoice::From(_)) }
+        let takes_every = matches!(choice, SeedChoice::From(_));
+        let goes_on = goes_on && given.is_none();
+        Self { given, world, first, goes_on, takes_every, seed: first, tried: 0, made: None }
     }
 
-    /// Returns the search with given states, which no other seed changes.
-    const fn with(self, given: Option<GivenStarts<'a>>) -> Self {
-        Self { given, goes_on: self.goes_on && given.is_none(), ..self }
+    /// Tries the next seed.
+    fn try_next(&mut self, starts: &Starts) {
+        let Self { world, first, goes_on, .. } = *self;
+        self.tried += 1;
+        let given = self.given.map(|given| given.of(world, starts.template.own().count()));
+        self.made = match starts.simulation(world, self.seed, given) {
+            Err(VectorError::Seed { .. }) if goes_on && self.tried < MOST_SEEDS => None,
+            Err(VectorError::Seed { why, .. }) if goes_on => Some(Err(VectorError::NoSeed { world, first, why })),
+            made => Some(made.map(|simulation| (self.seed, simulation))),
+        };
+        if self.made.is_none() {
+            self.seed = if self.takes_every { next_seed(self.seed, 1) } else { starts.later(self.seed) };
+        }
     }
 }
 
@@ -310,16 +319,10 @@ impl VectorSimulation {
         let common =
             (!is_random).then(|| started(template.own())).transpose()?.map(|start| Arc::new(Mutex::new(start)));
         let starts = Starts { template, law, common, worlds: seeds.len() as u64 };
-        let searches: Vec<_> = seeds.iter().zip(0..).map(|(&choice, k)| Search::of(choice, k, k as u64)).collect();
-        let world = |(seed, simulation)| World {
-            seed,
-            simulation,
-            commands: Rows::zeros(vehicles),
-            rests: false,
-            failure: None,
-        };
-        let made = starts.simulations(&searches, &threads, carries_on)?;
-        let worlds = made.into_iter().map(|made| made.map(world)).collect::<Result<_, _>>()?;
+        let searches = seeds.iter().zip(0..).map(|(&choice, k)| Search::of(choice, k, k as u64, None)).collect();
+        let world = |(seed, simulation)| World { seed, simulation, commands: Rows::zeros(vehicles), rests: false };
+        let made = starts.simulations(searches, &threads, carries_on)?;
+        let worlds = made.into_iter().map(|(_, made)| made.map(world)).collect::<Result<_, _>>()?;
         Ok(Self { starts, worlds, vehicles, resets_ended: false, threads })
     }
 
@@ -365,26 +368,6 @@ impl VectorSimulation {
         &self.worlds[world].simulation
     }
 
-    /// Returns an independent copy, which continues with the same bits.
-    #[must_use]
-    pub fn copied(&self) -> Self {
-        let Self { starts, worlds, vehicles, resets_ended, threads } = self;
-        let copied = |world: &World| World {
-            seed: world.seed,
-            simulation: world.simulation.clone(),
-            commands: world.commands.clone(),
-            rests: world.rests,
-            failure: None,
-        };
-        Self {
-            starts: starts.clone(),
-            worlds: worlds.iter().map(copied).collect(),
-            vehicles: *vehicles,
-            resets_ended: *resets_ended,
-            threads: threads.clone(),
-        }
-    }
-
     /// Returns the present seed of each world.
     pub fn seeds(&self) -> impl Iterator<Item = u64> + '_ {
         self.worlds.iter().map(|world| world.seed)
@@ -427,11 +410,9 @@ impl VectorSimulation {
         }
         let (count, vehicles, width) = (self.worlds.len() as u64, self.vehicles as u64, 3 * self.vehicles);
         let at_once = (VEHICLE_STEPS_AT_ONCE / (count * vehicles)).max(1);
-        let (mut flown, mut failure) = (0, None);
         self.worlds.iter_mut().for_each(|world| world.rests = false);
-        if self.resets_ended && steps > 0 {
-            failure = self.restart_ended(carries_on)?;
-        }
+        let restarted = if self.resets_ended && steps > 0 { self.restart_ended(carries_on)? } else { Ok(()) };
+        let mut flown = 0;
         while flown < steps {
             let some = at_once.min(steps - flown);
             let advance = |(k, world): (usize, &mut World)| {
@@ -440,35 +421,33 @@ impl VectorSimulation {
                 }
             };
             for_each(&mut self.worlds, (&self.threads, some.saturating_mul(count * vehicles)), states, advance);
-            let mut failures = self.worlds.iter_mut().filter_map(|world| world.failure.take());
-            failure = failure.or(failures.next());
-            failures.for_each(drop);
             flown += some;
             let all_rest = self.worlds.iter().all(|world| world.rests || world.simulation.ending().is_some());
             if all_rest || !carries_on() {
                 break;
             }
         }
-        failure.map_or(Ok(()), Err)
+        restarted
     }
 
-    /// Resets the worlds that have ended. Returns the error of the first one without a valid start, which stays ended.
-    fn restart_ended(&mut self, carries_on: &mut dyn FnMut() -> bool) -> Result<Option<VectorError>, VectorError> {
+    /// Resets the worlds that have ended. The inner error is that of the first one without a valid start, which stays
+    /// ended.
+    fn restart_ended(&mut self, carries_on: &mut dyn FnMut() -> bool) -> Result<Result<(), VectorError>, VectorError> {
         let ended = |(k, world): (usize, &World)| {
             let next = self.starts.later(world.seed);
-            world.simulation.ending().map(|_| Search::of(SeedChoice::Next, k, next))
+            world.simulation.ending().map(|_| Search::of(SeedChoice::Next, k, next, None))
         };
-        let searches: Vec<_> = self.worlds.iter().enumerate().filter_map(ended).collect();
-        let mut failure = None;
-        for (search, made) in searches.iter().zip(self.starts.simulations(&searches, &self.threads, carries_on)?) {
-            let world = &mut self.worlds[search.world];
+        let searches = self.worlds.iter().enumerate().filter_map(ended).collect();
+        let mut restarted = Ok(());
+        for (k, made) in self.starts.simulations(searches, &self.threads, carries_on)? {
+            let world = &mut self.worlds[k];
             world.rests = true;
             match made {
                 Ok(made) => (world.seed, world.simulation) = made,
-                Err(error) => failure = failure.or(Some(error)),
+                Err(error) => restarted = restarted.and(Err(error)),
             }
         }
-        Ok(failure)
+        Ok(restarted)
     }
 
     /// Resets the chosen worlds to their starts, with these seeds or else with the next seed of each. Writes the states
@@ -508,12 +487,12 @@ impl VectorSimulation {
             check("given velocities_m_s", numbers, given.velocities_m_s.len())?;
         }
         let choice = |k| seeds.map_or(SeedChoice::Next, |seeds: &[SeedChoice]| seeds[k]);
-        let next = |(k, world): (usize, &World)| Search::of(choice(k), k, self.starts.later(world.seed)).with(given);
-        let searches: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
-        let made = self.starts.simulations(&searches, &self.threads, carries_on)?;
-        let made = made.into_iter().collect::<Result<Vec<_>, _>>()?;
-        for (search, (seed, simulation)) in searches.into_iter().zip(made) {
-            (self.worlds[search.world].seed, self.worlds[search.world].simulation) = (seed, simulation);
+        let next = |(k, world): (usize, &World)| Search::of(choice(k), k, self.starts.later(world.seed), given);
+        let searches = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
+        let made = self.starts.simulations(searches, &self.threads, carries_on)?;
+        let made = made.into_iter().map(|(k, made)| Ok((k, made?))).collect::<Result<Vec<_>, VectorError>>()?;
+        for (k, made) in made {
+            (self.worlds[k].seed, self.worlds[k].simulation) = made;
         }
         for_each(&mut self.worlds, (&Threads::One, 0), states, |_| ());
         Ok(())
@@ -628,6 +607,7 @@ impl VectorSimulation {
 }
 
 impl World {
+    /// Flies steps, with accelerations that were checked.
     fn fly(&mut self, commands: Option<&[f64]>, steps: u64) {
         if let Some(commands) = commands {
             for (i, command) in commands.chunks_exact(3).enumerate() {
@@ -635,11 +615,9 @@ impl World {
             }
         }
         for _ in 0..steps {
-            if commands.is_none() {
-                self.simulation.step();
-            } else if let Err(error) = self.simulation.step_with(&self.commands) {
-                (self.failure, self.rests) = (Some(error.into()), true);
-                return;
+            match commands {
+                None => self.simulation.step(),
+                Some(_) => self.simulation.step_with_checked(&self.commands),
             }
             // Events are not recorded here.
             self.simulation.events().for_each(drop);
@@ -669,32 +647,31 @@ fn write_rows(state: &Swarm, positions_m: &mut [f64], velocities_m_s: &mut [f64]
 }
 
 impl Starts {
-    /// Returns the found seed of each search, with the simulation at its start. Calls `carries_on` on the calling
-    /// thread every [`SEARCH_AT_ONCE`].
+    /// Returns the world of each search with its result. Calls `carries_on` on the calling thread every
+    /// [`SEARCH_AT_ONCE`].
     ///
     /// # Errors
     /// [`VectorError::Interrupted`] if `carries_on` returns false.
     fn simulations(
         &self,
-        searches: &[Search<'_>],
+        mut searches: Vec<Search<'_>>,
         threads: &Threads,
         carries_on: &mut dyn FnMut() -> bool,
-    ) -> Result<Vec<Started>, VectorError> {
-        let mut attempts: Vec<_> = searches.iter().copied().map(Attempt::at_first).collect();
+    ) -> Result<Vec<(usize, Started)>, VectorError> {
         let helpers = threads.helpers(LOAD_OF_A_START * searches.len() as u64);
-        while attempts.iter().any(|attempt| attempt.made.is_none()) {
+        while searches.iter().any(|search| search.made.is_none()) {
             let began = Instant::now();
-            let in_progress = attempts.iter_mut().filter(|attempt| attempt.made.is_none());
-            threads.share(helpers, in_progress, |attempt| {
-                while attempt.made.is_none() && began.elapsed() < SEARCH_AT_ONCE {
-                    attempt.try_next(self);
+            let in_progress = searches.iter_mut().filter(|search| search.made.is_none());
+            threads.share(helpers, in_progress, |search| {
+                while search.made.is_none() && began.elapsed() < SEARCH_AT_ONCE {
+                    search.try_next(self);
                 }
             });
             if !carries_on() {
                 return Err(VectorError::Interrupted);
             }
         }
-        Ok(attempts.into_iter().filter_map(|attempt| attempt.made).collect())
+        Ok(searches.into_iter().filter_map(|search| Some((search.world, search.made?))).collect())
     }
 
     /// Returns the next seed of a world, among those of a scenario file.
@@ -738,27 +715,6 @@ fn started(scenario: &Scenario) -> Result<Simulation, VectorError> {
     simulation.stop_measuring_time();
     simulation.allow_free_steps(FreeSteps::Trusted);
     Ok(simulation)
-}
-
-impl<'a> Attempt<'a> {
-    const fn at_first(search: Search<'a>) -> Self {
-        Self { search, seed: search.first, tried: 0, made: None }
-    }
-
-    /// Tries the next seed.
-    fn try_next(&mut self, starts: &Starts) {
-        let Search { given, world, first, goes_on, takes_every } = self.search;
-        self.tried += 1;
-        let given = given.map(|given| given.of(world, starts.template.own().count()));
-        self.made = match starts.simulation(world, self.seed, given) {
-            Err(VectorError::Seed { .. }) if goes_on && self.tried < MOST_SEEDS => None,
-            Err(VectorError::Seed { why, .. }) if goes_on => Some(Err(VectorError::NoSeed { world, first, why })),
-            made => Some(made.map(|simulation| (self.seed, simulation))),
-        };
-        if self.made.is_none() {
-            self.seed = if takes_every { next_seed(self.seed, 1) } else { starts.later(self.seed) };
-        }
-    }
 }
 
 impl States {
