@@ -1,5 +1,7 @@
 //! Connects the audit with the simulation loop: sweeps every step and collects findings for the next sample.
 
+use nalgebra::Vector3;
+
 use super::ending::SimError;
 use crate::plant::{HullContact, Plant, StepPath};
 use crate::scenario::Scenario;
@@ -221,8 +223,6 @@ impl Judge {
         moved_m: f64,
     ) -> bool {
         let Some(barrier_m) = law.capabilities().barrier_m else { return false };
-        let start = &start.positions_m;
-        let instants = || path.instants().map(|(_, rows)| rows).chain([&end.positions_m]);
         if moved_m > 0.5 * self.clearance_margin_m
             && law.capabilities().avoids_obstacles
             && self.comes_near_obstacle(start, path, end)
@@ -234,17 +234,16 @@ impl Judge {
             return false;
         }
         let metric = self.metric;
-        let loses_half = |(i, j): (usize, usize)| {
-            let apart = |rows: &Rows| metric.scaled(row(rows, j) - row(rows, i));
-            let mut from = apart(start);
-            let least_m = barrier_m + 0.5 * (from.norm() - barrier_m);
-            instants().map(apart).any(|to| swept_separation_m(std::mem::replace(&mut from, to), to) < least_m)
+        let loses_half = |pair| {
+            let (from, swept_m) = swept(metric, (start, path, end), pair);
+            swept_m < barrier_m + 0.5 * (from.norm() - barrier_m)
         };
         if law.capabilities().sensing_range_m.is_none() {
             return links.edges().any(loses_half);
         }
         // Pairs beyond this distance keep half of their clearance.
-        self.near.update(start, metric.longest_m(barrier_m) + 4.0 * metric.ratio().max(1.0 / metric.ratio()) * moved_m);
+        let range_m = metric.longest_m(barrier_m) + 4.0 * metric.ratio().max(1.0 / metric.ratio()) * moved_m;
+        self.near.update(&start.positions_m, range_m);
         self.near.pairs().iter().copied().any(loses_half)
     }
 
@@ -268,35 +267,29 @@ impl Judge {
         moved_m: f64,
         enough: impl Fn(f64) -> bool,
     ) -> f64 {
-        let start = &start.positions_m;
-        let instants = || path.instants().map(|(_, rows)| rows).chain([&end.positions_m]);
         let least_m = self.nearest_m - self.metric.most_scaled(2.0 * moved_m);
         if enough(least_m) {
             return least_m;
         }
         let metric = self.metric;
-        let swept_m = |(i, j): (usize, usize)| {
-            let apart = |rows: &Rows| metric.scaled(row(rows, j) - row(rows, i));
-            let mut from = apart(start);
-            let passes = instants().map(apart).map(|to| swept_separation_m(std::mem::replace(&mut from, to), to));
-            passes.fold(f64::INFINITY, f64::min)
-        };
+        let swept_m = |pair| swept(metric, (start, path, end), pair).1;
         if law.capabilities().sensing_range_m.is_none() {
             links.edges().map(swept_m).fold(f64::INFINITY, f64::min)
         } else {
             let ratio = metric.ratio().max(1.0 / metric.ratio());
-            self.near.update(start, metric.longest_m(self.nearest_m.max(0.0)) + 4.0 * ratio * moved_m);
+            let range_m = metric.longest_m(self.nearest_m.max(0.0)) + 4.0 * ratio * moved_m;
+            self.near.update(&start.positions_m, range_m);
             self.near.pairs().iter().copied().map(swept_m).fold(f64::INFINITY, f64::min)
         }
     }
 
-    fn comes_near_obstacle(&self, start: &Rows, path: &StepPath, end: &Swarm) -> bool {
-        (0..start.nrows()).any(|i| {
+    fn comes_near_obstacle(&self, start: &Swarm, path: &StepPath, end: &Swarm) -> bool {
+        (0..start.count()).any(|i| {
             self.obstacles.iter().any(|obstacle| {
                 let limit_m = obstacle.clearance_m;
-                let mut from = row(start, i);
+                let mut from = row(&start.positions_m, i);
                 let least_m = limit_m + 0.5 * (swept_distance_m(obstacle, from, from) - limit_m);
-                path.instants().map(|(_, rows)| rows).chain([&end.positions_m]).any(|rows| {
+                passed(path, end).any(|rows| {
                     let to = row(rows, i);
                     swept_distance_m(obstacle, std::mem::replace(&mut from, to), to) < least_m
                 })
@@ -357,11 +350,27 @@ impl Judge {
 /// Returns the largest distance of a vehicle from its position at `start`, on its path to `end` \[m\].
 pub(super) fn longest_move_m(start: &Swarm, path: &StepPath, end: &Swarm) -> f64 {
     let start = &start.positions_m;
-    path.instants()
-        .map(|(_, rows)| rows)
-        .chain([&end.positions_m])
+    passed(path, end)
         .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
         .fold(0.0, f64::max)
+}
+
+/// Returns the positions at the instants of a path and at its end \[m\].
+fn passed<'a>(path: &'a StepPath, end: &'a Swarm) -> impl Iterator<Item = &'a Rows> {
+    path.instants().map(|(_, rows)| rows).chain([&end.positions_m])
+}
+
+/// Returns the distance vector of a pair at the start of a move, and its smallest separation on the way, scaled.
+fn swept(
+    metric: Metric,
+    (start, path, end): (&Swarm, &StepPath, &Swarm),
+    (i, j): (usize, usize),
+) -> (Vector3<f64>, f64) {
+    let apart = |rows: &Rows| metric.scaled(row(rows, j) - row(rows, i));
+    let from = apart(&start.positions_m);
+    let mut before = from;
+    let passes = passed(path, end).map(apart).map(|to| swept_separation_m(std::mem::replace(&mut before, to), to));
+    (from, passes.fold(f64::INFINITY, f64::min))
 }
 
 /// Returns the positions in the auditor's metric; unchanged if that is in metres.
@@ -440,7 +449,7 @@ mod tests {
         let mut scenario = Scenario::new("two", Swarm::at_rest(line(3.0)), Formation::line(2, 9.0), 2.0, 2.0);
         scenario.obstacles = vec![Obstacle {
             name: "ball".to_owned(),
-            place_m: nalgebra::Vector3::zeros(),
+            place_m: Vector3::zeros(),
             shape: Shape::Ball { radius_m: 1.0 },
             clearance_m: 1.0,
         }];
