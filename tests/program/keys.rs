@@ -301,12 +301,13 @@ fn every_key_of_a_campaign_is_on_its_page() {
 
 #[test]
 fn every_code_of_a_warning_is_on_its_page() {
+    use tautline::fact::Coded;
     use tautline::preflight::Code;
     for code in Code::ALL {
         let mark = if code.refuses() { " *" } else { "" };
-        let begin = format!("| `{}`{mark} |", code.name());
+        let begin = format!("| `{}`{mark} |", code.code());
         let mut rows = section(CODES, "\n## ", "Warnings of a check").lines();
-        assert!(rows.any(|row| row.starts_with(&begin)), "{}", code.name());
+        assert!(rows.any(|row| row.starts_with(&begin)), "{}", code.code());
     }
 }
 

@@ -9,6 +9,7 @@ use super::section::Section;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use tautline_audit::Status;
+use tautline_core::fact::Coded;
 use tautline_core::swarm::Bounce;
 use tautline_core::text::{seconds, significant, up_to};
 use tautline_laws::formation::Freedom;
@@ -73,7 +74,7 @@ impl Report {
         page.setup = about.setup();
         page.reasons = self.reasons_beside_headline();
         let warnings = about.preflight.warnings.iter();
-        page.warnings = warnings.map(|of| (of.code.name().to_owned(), of.message.clone())).collect();
+        page.warnings = warnings.map(|of| (of.code.code().to_owned(), of.message.clone())).collect();
         page.replay = Some(page::replay(&self.scenario.name, about.replay, Start::AtOnce));
         let rows = self.rows().into_iter().map(<[String; 2]>::from);
         page.add(

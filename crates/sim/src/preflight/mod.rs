@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::scenario::{MAX_HALVINGS, PlantSpec, Resolved, Scenario, TimeSpec};
 use crate::sim::{Breakdown, Ending, Simulation};
 use crate::vehicle::Quadrotor;
-use tautline_core::fact::serialize_coded;
+use tautline_core::fact::{Coded, serialize_coded};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::at_least;
 use tautline_laws::formation::affine_dimension;
@@ -299,7 +299,7 @@ impl Preflight {
     /// Returns the codes of the warnings that refuse the flight ([`Code::refuses`]).
     #[must_use]
     pub fn refusing(&self) -> Vec<&'static str> {
-        self.warnings.iter().filter(|warning| warning.code.refuses()).map(|warning| warning.code.name()).collect()
+        self.warnings.iter().filter(|warning| warning.code.refuses()).map(|warning| warning.code.code()).collect()
     }
 
     /// Returns whether some warning refuses the flight.

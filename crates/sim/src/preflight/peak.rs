@@ -1,6 +1,7 @@
 //! Accelerations that a law commands at the start of each leg.
 
 use crate::scenario::Scenario;
+use crate::vehicle::GRAVITY_M_S2;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::metres;
 use tautline_laws::law::Law;
@@ -8,8 +9,6 @@ use tautline_laws::observation::Observation;
 use tautline_laws::space::CellList;
 use tautline_laws::target::{CurrentTarget, Reference};
 
-/// Standard gravity \[m/s^2\].
-const GRAVITY_M_S2: f64 = 9.806_65;
 /// Largest acceleration that is not reported \[multiples of gravity\]. Agile racing multirotors reach about 5 g.
 const CREDIBLE_G: f64 = 5.0;
 

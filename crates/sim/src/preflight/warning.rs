@@ -5,6 +5,8 @@ use serde::Serialize;
 use super::{Connectivity, LegCertificate, Preflight, margins};
 use crate::shield::TrackingBasis;
 use crate::vehicle::Quadrotor;
+use tautline_core::coded;
+use tautline_core::fact::Coded;
 use tautline_core::text;
 use tautline_core::text::{at_least, beside_limit, counted, metres, seconds, table};
 
@@ -17,56 +19,40 @@ pub struct Warning {
     pub message: String,
 }
 
-/// Kind of a [`Warning`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Code {
-    /// Relative velocities are not damped.
-    RelativeVelocityUnstable,
-    /// The start lies on a line that the law never leaves, but the formation does not.
-    StartOnLine,
-    /// The start lies in a plane that the law never leaves, but the formation does not.
-    StartInPlane,
-    /// Even the shortest substep is longer than the law's links require.
-    StepTooLong,
-    /// The swarm drifts so far that numbers no longer resolve its positions.
-    DriftUnresolved,
-    /// The flight ends before its first step.
-    EndsAtStart,
-    /// Slots are nearer than the shield lets vehicles come.
-    SlotsTooNear,
-    /// Slots are nearer than the gap that vehicles under a shield keep by choice.
-    SlotsWithinEase,
-    /// A delay or command rate is beyond a predicted margin.
-    BeyondMargin,
-    /// No separation is certified.
-    NoCertificate,
-    /// The formation can be deformed without changing an edge length to first order.
-    NotRigid,
-    /// A flat formation in space: no force resists motion out of its plane to first order.
-    FlatFormationInSpace,
-    /// The law commands accelerations that few vehicles reach.
-    ExtremeAcceleration,
+coded! {
+    /// Kind of a [`Warning`], the most severe first.
+    #[derive(PartialOrd, Ord)]
+    Code {
+        /// Relative velocities are not damped.
+        RelativeVelocityUnstable = "relative-velocity-unstable",
+        /// The start lies on a line that the law never leaves, but the formation does not.
+        StartOnLine = "start-on-line",
+        /// The start lies in a plane that the law never leaves, but the formation does not.
+        StartInPlane = "start-in-plane",
+        /// Even the shortest substep is longer than the law's links require.
+        StepTooLong = "step-too-long",
+        /// The swarm drifts so far that numbers no longer resolve its positions.
+        DriftUnresolved = "drift-unresolved",
+        /// The flight ends before its first step.
+        EndsAtStart = "ends-at-start",
+        /// Slots are nearer than the shield lets vehicles come.
+        SlotsTooNear = "slots-too-near",
+        /// Slots are nearer than the gap that vehicles under a shield keep by choice.
+        SlotsWithinEase = "slots-within-ease",
+        /// A delay or command rate is beyond a predicted margin.
+        BeyondMargin = "beyond-margin",
+        /// No separation is certified.
+        NoCertificate = "no-certificate",
+        /// The formation can be deformed without changing an edge length to first order.
+        NotRigid = "not-rigid",
+        /// A flat formation in space: no force resists motion out of its plane to first order.
+        FlatFormationInSpace = "flat-formation-in-space",
+        /// The law commands accelerations that few vehicles reach.
+        ExtremeAcceleration = "extreme-acceleration",
+    }
 }
 
 impl Code {
-    /// All codes, the most severe first.
-    pub const ALL: [Self; 13] = [
-        Self::RelativeVelocityUnstable,
-        Self::StartOnLine,
-        Self::StartInPlane,
-        Self::StepTooLong,
-        Self::DriftUnresolved,
-        Self::EndsAtStart,
-        Self::SlotsTooNear,
-        Self::SlotsWithinEase,
-        Self::BeyondMargin,
-        Self::NoCertificate,
-        Self::NotRigid,
-        Self::FlatFormationInSpace,
-        Self::ExtremeAcceleration,
-    ];
-
     /// Returns whether the warning refuses the flight: the formation cannot be reached, or the flight would be
     /// meaningless.
     #[must_use]
@@ -82,31 +68,11 @@ impl Code {
                 | Self::SlotsTooNear
         )
     }
-
-    /// Returns the stable name, such as `start-on-line`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::RelativeVelocityUnstable => "relative-velocity-unstable",
-            Self::StartOnLine => "start-on-line",
-            Self::StartInPlane => "start-in-plane",
-            Self::StepTooLong => "step-too-long",
-            Self::DriftUnresolved => "drift-unresolved",
-            Self::EndsAtStart => "ends-at-start",
-            Self::SlotsTooNear => "slots-too-near",
-            Self::SlotsWithinEase => "slots-within-ease",
-            Self::BeyondMargin => "beyond-margin",
-            Self::NoCertificate => "no-certificate",
-            Self::NotRigid => "not-rigid",
-            Self::FlatFormationInSpace => "flat-formation-in-space",
-            Self::ExtremeAcceleration => "extreme-acceleration",
-        }
-    }
 }
 
 impl std::fmt::Display for Warning {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "warning [{}]: {}", self.code.name(), self.message)
+        write!(f, "warning [{}]: {}", self.code.code(), self.message)
     }
 }
 

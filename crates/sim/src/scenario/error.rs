@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use tautline_core::coded;
+use tautline_core::fact::Coded;
 use tautline_core::failure::{Failure, LONGEST_LINE, Place};
 use tautline_core::text::with_short_numbers;
 
@@ -25,100 +27,84 @@ pub struct ScenarioError {
     pub place: Option<Box<Place>>,
 }
 
-macro_rules! kinds {
-    ($(#[doc = $doc:literal] $kind:ident = $code:literal,)+) => {
-        /// Kind of a [`ScenarioError`].
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[non_exhaustive]
-        pub enum ErrorKind {
-            $(#[doc = $doc] $kind,)+
-        }
-
-        impl ErrorKind {
-            /// Returns the stable code, such as `scenario/out-of-range`.
-            #[must_use]
-            pub fn code(self) -> &'static str {
-                match self { $(Self::$kind => $code,)+ }
-            }
-        }
-    };
-}
-
-kinds! {
-    /// The source cannot be read.
-    CannotRead = "scenario/cannot-read",
-    /// A list has another length than the number of vehicles.
-    CountMismatch = "scenario/count-mismatch",
-    /// The graph is not connected.
-    Disconnected = "scenario/disconnected",
-    /// An edge of the graph does not join two vehicles.
-    Edge = "scenario/edge",
-    /// The text has no keys.
-    Empty = "scenario/empty",
-    /// Two keys exclude each other.
-    ExclusiveKeys = "scenario/exclusive-keys",
-    /// A file that the scenario names cannot be used.
-    File = "scenario/file",
-    /// Two hulls do not fit within the safety distance.
-    HullsTouch = "scenario/hulls-touch",
-    /// Keys contradict each other.
-    Inconsistent = "scenario/inconsistent",
-    /// The law cannot be built with its parameters.
-    LawParameter = "law/parameter",
-    /// The flight needs too much memory.
-    Memory = "scenario/memory",
-    /// A required key is missing.
-    MissingKey = "scenario/missing-key",
-    /// A name has other characters than letters, digits, `-` and `_`.
-    Name = "scenario/name",
-    /// A vehicle or a slot is within the clearance of an obstacle.
-    NearObstacle = "scenario/near-obstacle",
-    /// The vehicles do not fit into the space of the start.
-    NoRoom = "scenario/no-room",
-    /// The file or the built-in scenario does not exist.
-    NotFound = "scenario/not-found",
-    /// The text is not UTF-8.
-    NotUtf8 = "scenario/not-utf8",
-    /// An obstacle cannot be judged.
-    Obstacle = "scenario/obstacle",
-    /// A number is out of its range.
-    OutOfRange = "scenario/out-of-range",
-    /// A time or a duration is outside the flight.
-    OutsideFlight = "scenario/outside-flight",
-    /// An override cannot be applied.
-    Override = "scenario/override",
-    /// A vector leaves the plane of the swarm.
-    Plane = "scenario/plane",
-    /// The reference cannot be followed.
-    Reference = "scenario/reference",
-    /// A shape gives no formation.
-    Shape = "scenario/shape",
-    /// The shield has no certificate.
-    Shield = "scenario/shield",
-    /// The step is too long for a rate or a duration.
-    StepTooLong = "scenario/step-too-long",
-    /// The text is not TOML.
-    Syntax = "scenario/syntax",
-    /// The file is too large.
-    TooLarge = "scenario/too-large",
-    /// The flight has too many steps.
-    TooManySteps = "scenario/too-many-steps",
-    /// A word is none of the choices.
-    UnknownChoice = "scenario/unknown-choice",
-    /// The key does not exist.
-    UnknownKey = "scenario/unknown-key",
-    /// The vehicle does not exist.
-    UnknownVehicle = "scenario/unknown-vehicle",
-    /// The law does not support a setting.
-    UnsupportedByLaw = "scenario/unsupported-by-law",
-    /// The plant does not support a setting.
-    UnsupportedByPlant = "scenario/unsupported-by-plant",
-    /// The vehicle does not support a setting.
-    UnsupportedByVehicle = "scenario/unsupported-by-vehicle",
-    /// Two starts or two slots are within the safety distance.
-    WithinDelta = "scenario/within-delta",
-    /// A value has the wrong type.
-    WrongType = "scenario/wrong-type",
+coded! {
+    /// Kind of a [`ScenarioError`].
+    ErrorKind {
+        /// The source cannot be read.
+        CannotRead = "scenario/cannot-read",
+        /// A list has another length than the number of vehicles.
+        CountMismatch = "scenario/count-mismatch",
+        /// The graph is not connected.
+        Disconnected = "scenario/disconnected",
+        /// An edge of the graph does not join two vehicles.
+        Edge = "scenario/edge",
+        /// The text has no keys.
+        Empty = "scenario/empty",
+        /// Two keys exclude each other.
+        ExclusiveKeys = "scenario/exclusive-keys",
+        /// A file that the scenario names cannot be used.
+        File = "scenario/file",
+        /// Two hulls do not fit within the safety distance.
+        HullsTouch = "scenario/hulls-touch",
+        /// Keys contradict each other.
+        Inconsistent = "scenario/inconsistent",
+        /// The law cannot be built with its parameters.
+        LawParameter = "law/parameter",
+        /// The flight needs too much memory.
+        Memory = "scenario/memory",
+        /// A required key is missing.
+        MissingKey = "scenario/missing-key",
+        /// A name has other characters than letters, digits, `-` and `_`.
+        Name = "scenario/name",
+        /// A vehicle or a slot is within the clearance of an obstacle.
+        NearObstacle = "scenario/near-obstacle",
+        /// The vehicles do not fit into the space of the start.
+        NoRoom = "scenario/no-room",
+        /// The file or the built-in scenario does not exist.
+        NotFound = "scenario/not-found",
+        /// The text is not UTF-8.
+        NotUtf8 = "scenario/not-utf8",
+        /// An obstacle cannot be judged.
+        Obstacle = "scenario/obstacle",
+        /// A number is out of its range.
+        OutOfRange = "scenario/out-of-range",
+        /// A time or a duration is outside the flight.
+        OutsideFlight = "scenario/outside-flight",
+        /// An override cannot be applied.
+        Override = "scenario/override",
+        /// A vector leaves the plane of the swarm.
+        Plane = "scenario/plane",
+        /// The reference cannot be followed.
+        Reference = "scenario/reference",
+        /// A shape gives no formation.
+        Shape = "scenario/shape",
+        /// The shield has no certificate.
+        Shield = "scenario/shield",
+        /// The step is too long for a rate or a duration.
+        StepTooLong = "scenario/step-too-long",
+        /// The text is not TOML.
+        Syntax = "scenario/syntax",
+        /// The file is too large.
+        TooLarge = "scenario/too-large",
+        /// The flight has too many steps.
+        TooManySteps = "scenario/too-many-steps",
+        /// A word is none of the choices.
+        UnknownChoice = "scenario/unknown-choice",
+        /// The key does not exist.
+        UnknownKey = "scenario/unknown-key",
+        /// The vehicle does not exist.
+        UnknownVehicle = "scenario/unknown-vehicle",
+        /// The law does not support a setting.
+        UnsupportedByLaw = "scenario/unsupported-by-law",
+        /// The plant does not support a setting.
+        UnsupportedByPlant = "scenario/unsupported-by-plant",
+        /// The vehicle does not support a setting.
+        UnsupportedByVehicle = "scenario/unsupported-by-vehicle",
+        /// Two starts or two slots are within the safety distance.
+        WithinDelta = "scenario/within-delta",
+        /// A value has the wrong type.
+        WrongType = "scenario/wrong-type",
+    }
 }
 
 impl ErrorKind {
