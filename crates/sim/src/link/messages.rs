@@ -56,7 +56,7 @@ impl Messages {
         }
         Self {
             rate_hz,
-            begins_s: sensing.latency_s(),
+            begins_s: sensing.sensor.latency_s(),
             radio: Radio::new(scenario, links.len(), RadioUse::States),
             received,
             links,

@@ -243,7 +243,7 @@ impl ScenarioImperfections {
     fn new(scenario: &Scenario, senses: bool) -> Self {
         let (sensing, relative_sensor) = (StateSensor::new(scenario), RelativeSensor::new(scenario));
         let network = Network::new(scenario, &sensing);
-        let span_s = sensing.span_s().max(relative_sensor.span_s()) + scenario.network.latency_s;
+        let span_s = sensing.sensor.span_s().max(relative_sensor.sensor.span_s()) + scenario.network.latency_s;
         Self {
             history: History::new(span_s),
             is_shared: matches!(network, Network::None) && (!senses || relative_sensor.uses_own_measurements()),
@@ -341,8 +341,8 @@ impl Imperfections for ScenarioImperfections {
 
     fn forget_after(&mut self, time_s: f64) {
         self.history.forget_after(time_s);
-        self.sensing.forget_after(time_s);
-        self.relative_sensor.forget_after(time_s);
+        self.sensing.sensor.forget_after(time_s);
+        self.relative_sensor.sensor.forget_after(time_s);
     }
 
     fn settle(&mut self, time_s: f64) {
@@ -351,8 +351,8 @@ impl Imperfections for ScenarioImperfections {
     }
 
     fn longest_step_s(&self) -> f64 {
-        let received_s = self.network.delay_s().map_or(0.0, |delay_s| self.sensing.latency_s() + delay_s);
-        let delays = [self.sensing.latency_s(), self.relative_sensor.latency_s(), received_s];
+        let received_s = self.network.delay_s().map_or(0.0, |delay_s| self.sensing.sensor.latency_s() + delay_s);
+        let delays = [self.sensing.sensor.latency_s(), self.relative_sensor.sensor.latency_s(), received_s];
         let shortest_s = delays.into_iter().filter(|delay_s| *delay_s > 0.0).fold(f64::INFINITY, f64::min);
         shortest_s / STEPS_PER_DELAY
     }

@@ -165,7 +165,9 @@ impl Scenario {
 
     fn check_link(&self, entry: usize, failure: &LinkFailure) -> Result<(), ScenarioError> {
         let &LinkFailure { link: [a, b], from_s, to_s } = failure;
-        let refuse = |kind: ErrorKind, said: String, help: &str| Err(kind.at(&[&entry_key("network.failure", entry)], said, help));
+        let refuse = |kind: ErrorKind, said: String, help: &str| {
+            Err(kind.at(&[&entry_key("network.failure", entry)], said, help))
+        };
         let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
         let is_link = match (index(a), index(b)) {
             (Some(i), Some(j)) if i != j && i.max(j) < self.count() => {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::history::History;
 use super::noise::{Noise, NoiseSource};
 use super::{ImperfectionSpec, latency};
-use crate::scenario::{ErrorKind, Scenario, ScenarioError, Space, is_default};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError, is_default};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::law::VoidReason;
 use tautline_laws::observation::NeighbourState;
@@ -106,15 +106,46 @@ pub(crate) fn period(time_s: f64, rate_hz: f64) -> u64 {
     number
 }
 
-/// Times of measurements: the latest one available at a time, and its number.
-#[derive(Clone, Copy, Debug)]
-struct MeasurementTimes {
+/// Sensor: the times of its measurements and their errors.
+#[derive(Clone, Debug)]
+pub(super) struct Sensor {
     rate_hz: Option<f64>,
     latency_s: f64,
+    /// Standard deviations of errors along each axis \[m\] and \[m/s\].
+    position_m: f64,
+    velocity_m_s: f64,
+    axes: usize,
+    noise: Noise,
+    /// Number of the held measurement.
+    held: Option<u64>,
 }
 
-impl MeasurementTimes {
-    fn latest(self, time_s: f64) -> (f64, u64) {
+impl Sensor {
+    fn new(scenario: &Scenario, latency_s: f64, source: NoiseSource) -> Self {
+        let SensingSpec { rate_hz, position_noise_m, velocity_noise_m_s, .. } = scenario.sensing;
+        Self {
+            rate_hz,
+            latency_s,
+            position_m: position_noise_m,
+            velocity_m_s: velocity_noise_m_s,
+            axes: scenario.space.dimensions(),
+            noise: Noise::new(scenario.noise_seed, source),
+            held: None,
+        }
+    }
+
+    /// Returns the latency \[s\].
+    pub(super) fn latency_s(&self) -> f64 {
+        self.latency_s
+    }
+
+    /// Returns the required length of the history \[s\].
+    pub(super) fn span_s(&self) -> f64 {
+        self.latency_s + self.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz) + SAME_S
+    }
+
+    /// Returns the time of the measurement that is available at a time \[s\], and its number.
+    fn latest(&self, time_s: f64) -> (f64, u64) {
         let late_s = (time_s - self.latency_s).max(0.0);
         self.rate_hz.map_or((late_s, 0), |rate_hz| {
             let number = period(late_s, rate_hz);
@@ -122,141 +153,99 @@ impl MeasurementTimes {
         })
     }
 
-    /// Returns the required length of the history \[s\].
-    fn span_s(self) -> f64 {
-        self.latency_s + self.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz) + SAME_S
-    }
-}
-
-/// Standard deviations of errors along each axis.
-#[derive(Clone, Copy, Debug)]
-struct NoiseDeviations {
-    position_m: f64,
-    velocity_m_s: f64,
-    axes: usize,
-}
-
-impl NoiseDeviations {
-    fn are_zero(self) -> bool {
-        self.position_m == 0.0 && self.velocity_m_s == 0.0
+    /// Holds the measurement that is available at a time \[s\]. Returns whether it is another one than before.
+    fn hold_latest(&mut self, time_s: f64) -> bool {
+        let number = self.rate_hz.map(|_| self.latest(time_s).1);
+        number.is_none() || std::mem::replace(&mut self.held, number) != number
     }
 
-    /// Returns errors of position \[m\] and velocity \[m/s\] from six normal numbers.
-    fn of(self, normals: [f64; 6]) -> (Vector3<f64>, Vector3<f64>) {
+    /// Drops measurements made after a time \[s\].
+    pub(super) fn forget_after(&mut self, time_s: f64) {
+        let (_, number) = self.latest(time_s);
+        self.held = self.held.filter(|&held| held <= number);
+    }
+
+    /// Returns the errors of position \[m\] and velocity \[m/s\] of a measurement by a vehicle of another; zero for an
+    /// exact sensor.
+    fn errors(&self, vehicle: usize, other: usize, number: u64) -> (Vector3<f64>, Vector3<f64>) {
+        if !self.is_noisy() {
+            return (Vector3::zeros(), Vector3::zeros());
+        }
+        let normals = self.noise.draw(vehicle, other, number, 6).six_normals();
         let along = |from: usize, deviation: f64| {
             Vector3::from_fn(|axis, _| if axis < self.axes { deviation * normals[from + axis] } else { 0.0 })
         };
         (along(0, self.position_m), along(3, self.velocity_m_s))
+    }
+
+    fn is_noisy(&self) -> bool {
+        self.position_m != 0.0 || self.velocity_m_s != 0.0
     }
 }
 
 /// Vehicles' measurements of themselves.
 #[derive(Clone, Debug)]
 pub(super) struct StateSensor {
-    clock: MeasurementTimes,
-    errors: NoiseDeviations,
-    noise: Noise,
+    pub(super) sensor: Sensor,
     /// Constant errors, N x 3 \[m\].
     bias_m: Rows,
     is_biased: bool,
-    /// Number of the held measurement.
-    held: Option<u64>,
 }
 
 impl StateSensor {
     pub(super) fn new(scenario: &Scenario) -> Self {
-        let SensingSpec { rate_hz, latency_s, position_bias_m, .. } = scenario.sensing;
-        Self {
-            clock: MeasurementTimes { rate_hz, latency_s },
-            errors: errors(scenario),
-            noise: Noise::new(scenario.noise_seed, NoiseSource::Own),
-            bias_m: bias_m(scenario, position_bias_m),
-            is_biased: position_bias_m > 0.0,
-            held: None,
-        }
+        let SensingSpec { latency_s, position_bias_m, .. } = scenario.sensing;
+        let mut bias_m = Rows::zeros(scenario.count());
+        let bias = Sensor::new(scenario, 0.0, NoiseSource::Bias);
+        let bias = Sensor { position_m: position_bias_m, velocity_m_s: 0.0, ..bias };
+        (0..scenario.count()).for_each(|vehicle| set_row(&mut bias_m, vehicle, bias.errors(vehicle, 0, 0).0));
+        let sensor = Sensor::new(scenario, latency_s, NoiseSource::Own);
+        Self { sensor, bias_m, is_biased: position_bias_m > 0.0 }
     }
 
     /// Changes the seed of later measurements; the held measurement and constant errors stay.
     pub(super) fn reseed(&mut self, seed: u64) {
-        self.noise.reseed(seed, self.held.unwrap_or_default());
-    }
-
-    pub(super) fn span_s(&self) -> f64 {
-        self.clock.span_s()
-    }
-
-    pub(super) fn latency_s(&self) -> f64 {
-        self.clock.latency_s
+        self.sensor.noise.reseed(seed, self.sensor.held.unwrap_or_default());
     }
 
     /// Returns whether vehicles know their true present state.
     pub(super) fn is_exact(&self) -> bool {
-        self.clock.rate_hz.is_none() && self.clock.latency_s == 0.0 && !self.has_errors()
+        self.sensor.rate_hz.is_none() && self.sensor.latency_s == 0.0 && !self.has_errors()
     }
 
     /// Returns whether measurements have errors.
     fn has_errors(&self) -> bool {
-        !self.errors.are_zero() || self.is_biased
+        self.sensor.is_noisy() || self.is_biased
     }
 
     /// Returns the time of the measurement that is available at a time \[s\].
     pub(super) fn measured_s(&self, time_s: f64) -> f64 {
-        self.clock.latest(time_s).0
-    }
-
-    /// Drops measurements made after a time \[s\].
-    pub(super) fn forget_after(&mut self, time_s: f64) {
-        let (_, number) = self.clock.latest(time_s);
-        self.held = self.held.filter(|&held| held <= number);
+        self.sensor.latest(time_s).0
     }
 
     /// Updates `known` to the present measurement. `known` must hold the result of the previous call.
     pub(super) fn update(&mut self, history: &History, time_s: f64, now: &Swarm, known: &mut Swarm) {
-        let number = self.clock.rate_hz.map(|_| self.clock.latest(time_s).1);
-        if number.is_none() || number != self.held {
+        if self.sensor.hold_latest(time_s) {
             self.measure(history, time_s, Some(now), known);
-            self.held = number;
         }
     }
 
     /// Writes the measurement that is available at a present or past time; `now` is the state at that time if it is the
     /// present.
     pub(super) fn measure(&self, history: &History, time_s: f64, now: Option<&Swarm>, known: &mut Swarm) {
-        let (measured_s, number) = self.clock.latest(time_s);
+        let (measured_s, number) = self.sensor.latest(time_s);
         read_state(history, measured_s, now.filter(|_| measured_s >= time_s), known);
         if !self.has_errors() {
             return;
         }
         for vehicle in 0..known.count() {
-            let (off_m, off_m_s) = if self.errors.are_zero() {
-                (Vector3::zeros(), Vector3::zeros())
-            } else {
-                self.errors.of(self.noise.draw(vehicle, 0, number, 6).six_normals())
-            };
+            let (off_m, off_m_s) = self.sensor.errors(vehicle, 0, number);
             let position_m = row(&known.positions_m, vehicle) + row(&self.bias_m, vehicle) + off_m;
             let velocity_m_s = row(&known.velocities_m_s, vehicle) + off_m_s;
             set_row(&mut known.positions_m, vehicle, position_m);
             set_row(&mut known.velocities_m_s, vehicle, velocity_m_s);
         }
     }
-}
-
-/// Draws constant errors with a standard deviation \[m\], N x 3 \[m\].
-fn bias_m(scenario: &Scenario, position_m: f64) -> Rows {
-    let mut bias_m = Rows::zeros(scenario.count());
-    let bias = Noise::new(scenario.noise_seed, NoiseSource::Bias);
-    let lasting = NoiseDeviations { position_m, velocity_m_s: 0.0, axes: scenario.space.dimensions() };
-    for vehicle in (0..scenario.count()).filter(|_| position_m > 0.0) {
-        let (off_m, _) = lasting.of(bias.draw(vehicle, 0, 0, 6).six_normals());
-        set_row(&mut bias_m, vehicle, off_m);
-    }
-    bias_m
-}
-
-fn errors(scenario: &Scenario) -> NoiseDeviations {
-    let SensingSpec { position_noise_m, velocity_noise_m_s, .. } = scenario.sensing;
-    let axes = if scenario.space == Space::Plane { 2 } else { 3 };
-    NoiseDeviations { position_m: position_noise_m, velocity_m_s: velocity_noise_m_s, axes }
 }
 
 /// Writes the state at a present or past time.
@@ -273,13 +262,10 @@ fn read_state(history: &History, time_s: f64, now: Option<&Swarm>, state: &mut S
 /// drawn for each observed vehicle.
 #[derive(Clone, Debug)]
 pub(super) struct RelativeSensor {
-    clock: MeasurementTimes,
-    errors: NoiseDeviations,
-    noise: Noise,
+    pub(super) sensor: Sensor,
     /// Measured true state, and the number of the measurement.
     sensed: Swarm,
     number: u64,
-    held: Option<u64>,
     age_s: f64,
     /// Whether vehicles measure each other at their own measured states.
     uses_own_measurements: bool,
@@ -289,12 +275,9 @@ impl RelativeSensor {
     pub(super) fn new(scenario: &Scenario) -> Self {
         let sensing = scenario.sensing;
         Self {
-            clock: MeasurementTimes { rate_hz: sensing.rate_hz, latency_s: sensing.near_s() },
-            errors: errors(scenario),
-            noise: Noise::new(scenario.noise_seed, NoiseSource::RelativeSensor),
+            sensor: Sensor::new(scenario, sensing.near_s(), NoiseSource::RelativeSensor),
             sensed: scenario.start.clone(),
             number: 0,
-            held: None,
             age_s: 0.0,
             uses_own_measurements: !sensing.is_noisy() && sensing.near_s() == sensing.latency_s,
         }
@@ -302,15 +285,7 @@ impl RelativeSensor {
 
     /// Changes the seed of later measurements.
     pub(super) fn reseed(&mut self, seed: u64) {
-        self.noise.reseed(seed, self.number);
-    }
-
-    pub(super) fn span_s(&self) -> f64 {
-        self.clock.span_s()
-    }
-
-    pub(super) fn latency_s(&self) -> f64 {
-        self.clock.latency_s
+        self.sensor.noise.reseed(seed, self.number);
     }
 
     /// Returns whether vehicles measure each other at their own measured states.
@@ -325,19 +300,11 @@ impl RelativeSensor {
 
     /// Measures at a time at which the true state is `now`.
     pub(super) fn measure(&mut self, history: &History, time_s: f64, now: &Swarm) {
-        let (seen_s, number) = self.clock.latest(time_s);
-        let measured = self.clock.rate_hz.map(|_| number);
-        if measured.is_none() || measured != self.held {
+        let (seen_s, number) = self.sensor.latest(time_s);
+        if self.sensor.hold_latest(time_s) {
             read_state(history, seen_s, Some(now).filter(|_| seen_s >= time_s), &mut self.sensed);
-            self.held = measured;
         }
         (self.number, self.age_s) = (number, time_s - seen_s);
-    }
-
-    /// Drops measurements made after a time \[s\].
-    pub(super) fn forget_after(&mut self, time_s: f64) {
-        let (_, number) = self.clock.latest(time_s);
-        self.held = self.held.filter(|&held| held <= number);
     }
 
     /// Returns the measurement of vehicle `j` by vehicle `i`, whose own measurement is its row of `own`.
@@ -347,11 +314,7 @@ impl RelativeSensor {
             return sensed;
         }
         let from = NeighbourState::of(&self.sensed, i, 0.0);
-        let (off_m, off_m_s) = if self.errors.are_zero() {
-            (Vector3::zeros(), Vector3::zeros())
-        } else {
-            self.errors.of(self.noise.draw(i, j, self.number, 6).six_normals())
-        };
+        let (off_m, off_m_s) = self.sensor.errors(i, j, self.number);
         NeighbourState {
             position_m: row(&own.positions_m, i) + (sensed.position_m - from.position_m) + off_m,
             velocity_m_s: row(&own.velocities_m_s, i) + (sensed.velocity_m_s - from.velocity_m_s) + off_m_s,
