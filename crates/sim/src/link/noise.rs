@@ -1,8 +1,10 @@
 //! Random numbers that depend on a counter, not on the order of draws.
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+use rand_chacha::rand_core::SeedableRng as _;
 use std::f64::consts::TAU;
+
+use crate::scenario::unit;
 
 /// Words of a block of the generator; each draw begins at a block boundary.
 const BLOCK_WORDS: u128 = 16;
@@ -64,8 +66,7 @@ pub(super) struct Draw {
 impl Draw {
     /// Returns a uniform number in \[0, 1), a multiple of 2^-53.
     pub(super) fn unit(&mut self) -> f64 {
-        const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
-        (self.random.next_u64() >> 11) as f64 * SCALE
+        unit(&mut self.random)
     }
 
     /// Returns two independent standard normal numbers (Box and Muller) from two doubles.

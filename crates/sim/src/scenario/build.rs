@@ -163,7 +163,7 @@ fn space(document: &Document) -> Result<Space, ScenarioError> {
         None => {
             let listed = [&document.start.positions_m, &document.start.velocities_m_s];
             let start_is_flat = listed.into_iter().flatten().all(|points| flat(points))
-                && !matches!(document.start.shape, Some(StartShape::Sphere { .. }));
+                && !matches!(document.start.shape, Some(StartShape::Sphere(_)));
             Ok(if start_is_flat && formation_is_flat { Space::Plane } else { Space::Volume })
         }
     }

@@ -173,29 +173,13 @@ pub(super) struct StartTable {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum StartShape {
     /// Vehicles 1, 2, ... along the x axis.
-    Line {
-        /// Distance between neighbours in m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        spacing_m: f64,
-    },
+    Line(DistanceKeys),
     /// A near-square grid in the plane z = 0, row by row.
-    Grid {
-        /// Distance between neighbours in m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        spacing_m: f64,
-    },
+    Grid(DistanceKeys),
     /// A circle in the plane z = 0.
-    Circle {
-        /// Radius in m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        radius_m: f64,
-    },
+    Circle(RadiusKeys),
     /// Points distributed evenly over a sphere.
-    Sphere {
-        /// Radius in m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        radius_m: f64,
-    },
+    Sphere(RadiusKeys),
     /// Uniformly random positions in a square, or in a cube in three dimensions, with a smallest separation.
     Random {
         /// Half the side of the square or cube around the origin in m.
@@ -288,29 +272,13 @@ pub(super) enum FormationShape {
         side_m: f64,
     },
     /// Slots at equal angles on a circle in the plane z = 0.
-    Circle {
-        /// Radius in m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        radius_m: f64,
-    },
+    Circle(RadiusKeys),
     /// Slots along the x axis.
-    Line {
-        /// Distance between neighbours in m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        spacing_m: f64,
-    },
+    Line(DistanceKeys),
     /// A near-square grid in the plane z = 0, row by row.
-    Grid {
-        /// Distance between neighbours in m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        spacing_m: f64,
-    },
+    Grid(DistanceKeys),
     /// Points distributed evenly over a sphere.
-    Sphere {
-        /// Radius in m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        radius_m: f64,
-    },
+    Sphere(RadiusKeys),
     /// Two arms that meet at the first slot, in the plane z = 0.
     V(VKeys),
     /// A filled triangle in the plane z = 0: rows of 1, 2, 3, ... slots.
@@ -417,6 +385,24 @@ pub(super) struct VKeys {
 
 fn right_angle_deg() -> f64 {
     90.0
+}
+
+/// Keys of a shape with a distance between neighbours.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DistanceKeys {
+    /// Distance between neighbours in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) spacing_m: f64,
+}
+
+/// Keys of a shape with a radius.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RadiusKeys {
+    /// Radius in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) radius_m: f64,
 }
 
 /// Keys of a shape that has only a spacing.

@@ -145,10 +145,10 @@ pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), Scenari
 pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
     Ok(match shape {
         &FormationShape::Pentagon { side_m } => Formation::pentagon(side_m),
-        &FormationShape::Circle { radius_m } => Formation::circle(count, radius_m),
-        &FormationShape::Line { spacing_m } => Formation::line(count, spacing_m),
-        &FormationShape::Grid { spacing_m } => Formation::grid(count, spacing_m),
-        &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius_m),
+        FormationShape::Circle(keys) => Formation::circle(count, keys.radius_m),
+        FormationShape::Line(keys) => Formation::line(count, keys.spacing_m),
+        FormationShape::Grid(keys) => Formation::grid(count, keys.spacing_m),
+        FormationShape::Sphere(keys) => Formation::sphere(count, keys.radius_m),
         FormationShape::V(keys) => Formation::v(count, spacing(keys.spacing_m, delta_m), keys.angle_deg.to_radians()),
         FormationShape::Wedge(keys) => Formation::wedge(count, spacing(keys.spacing_m, delta_m)),
         FormationShape::Rings(keys) => Formation::rings(count, spacing(keys.spacing_m, delta_m)),
@@ -192,7 +192,7 @@ pub(super) fn resolve_path(folder: &std::path::Path, shape: &mut FormationShape)
 pub(super) fn is_flat(shape: &FormationShape) -> bool {
     match shape {
         FormationShape::Points { points_m } => points_m.iter().all(|point| point.coordinates()[2] == 0.0),
-        FormationShape::Sphere { .. } | FormationShape::Helix(_) | FormationShape::Cube(_) => false,
+        FormationShape::Sphere(_) | FormationShape::Helix(_) | FormationShape::Cube(_) => false,
         _ => true,
     }
 }

@@ -51,6 +51,7 @@ pub use resolved::Resolved;
 pub use schema::{TomlSchema, key_choices, key_paths, schema};
 pub use source::{MAX_FILE_BYTES, Source, takes_integers_only};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};
+pub(crate) use start::unit;
 pub use start::{offset, random, scatter};
 pub use template::{Draw, NamedLaw, Template};
 pub use text::Override;

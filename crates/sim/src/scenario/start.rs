@@ -25,12 +25,12 @@ pub(super) fn positions(
     delta_m: f64,
     random: &mut ChaCha8Rng,
 ) -> Result<Rows, ScenarioError> {
-    let formation = match *shape {
-        StartShape::Line { spacing_m } => Formation::line(count, spacing_m),
-        StartShape::Grid { spacing_m } => Formation::grid(count, spacing_m),
-        StartShape::Circle { radius_m } => Formation::circle(count, radius_m),
-        StartShape::Sphere { radius_m } => Formation::sphere(count, radius_m),
-        StartShape::Random { half_extent_m, min_separation_m } => {
+    let formation = match shape {
+        StartShape::Line(keys) => Formation::line(count, keys.spacing_m),
+        StartShape::Grid(keys) => Formation::grid(count, keys.spacing_m),
+        StartShape::Circle(keys) => Formation::circle(count, keys.radius_m),
+        StartShape::Sphere(keys) => Formation::sphere(count, keys.radius_m),
+        &StartShape::Random { half_extent_m, min_separation_m } => {
             let min_separation_m = min_separation_m.unwrap_or(DEFAULT_SEPARATION * delta_m);
             if min_separation_m <= delta_m {
                 let problem =
@@ -124,7 +124,7 @@ pub(super) fn below(end: u64, random: &mut ChaCha8Rng) -> usize {
 }
 
 /// Returns a uniform number in \[0, 1), a multiple of 2^-53.
-pub(super) fn unit(random: &mut ChaCha8Rng) -> f64 {
+pub(crate) fn unit(random: &mut ChaCha8Rng) -> f64 {
     const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
     (random.next_u64() >> 11) as f64 * SCALE
 }

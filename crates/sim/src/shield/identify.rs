@@ -98,14 +98,6 @@ enum Wishes {
     Chase(Vector3<f64>, f64),
 }
 
-/// Reference of a flight.
-#[derive(Clone, Debug)]
-struct Course {
-    name: String,
-    along: Vector3<f64>,
-    wishes: Wishes,
-}
-
 /// Result of a flight.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Flown {
@@ -287,6 +279,7 @@ fn whole(value: f64) -> usize {
 }
 
 /// Extremes of all flights.
+#[derive(Default)]
 struct Measured {
     worst: Flown,
     sequence: String,
@@ -317,18 +310,14 @@ impl Measured {
 
 /// Flies all courses, then a search of some generations from the worst of each direction.
 fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64, generations: u64) -> Measured {
-    let mut measured = Measured {
-        worst: Flown::default(),
-        sequence: String::new(),
-        feedback_m_s2: 0.0,
-        command_m_s2: 0.0,
-        thrust_share: 0.0,
-        flights: 0,
-    };
+    let mut measured = Measured::default();
     let mut seeds: Vec<(String, Plan)> = Vec::new();
     let period_s = limits.settings().period_s;
     for (direction, along) in directions(alone.space) {
-        let flown = |course: Course| (fly(alone, limits, &course, DURATION_S), course);
+        let flown = |(name, wishes): (String, Wishes)| {
+            let flown = fly(alone, limits, along, &wishes, DURATION_S);
+            (flown, name, wishes)
+        };
         let reversed = REVERSALS_S.map(|half_s| (half_s, flown(reversals(direction, along, half_s))));
         let worst = reversed.iter().max_by(|(_, a), (_, b)| a.0.error_m.total_cmp(&b.0.error_m));
         let worst_s = worst.map_or(1.0, |(half_s, _)| *half_s);
@@ -337,12 +326,12 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64, generations: u64) -
             courses(direction, along).into_iter().chain([matched(alone, limits, (direction, along), period_s)]);
         let mut still: Vec<_> =
             others.map(flown).chain(reversed.into_iter().map(|(_, flown)| flown)).chain(refined).collect();
-        still.sort_by(|(a, _), (b, _)| b.error_m.total_cmp(&a.error_m));
-        for (flown, course) in still.iter().take(2) {
-            seeds.extend(in_winds(&course.name, &plan(course, flown), (along, flown.at_s), wind_m_s > 0.0));
+        still.sort_by(|(a, ..), (b, ..)| b.error_m.total_cmp(&a.error_m));
+        for (flown, name, wishes) in still.iter().take(2) {
+            seeds.extend(in_winds(name, &plan(wishes, flown), (along, flown.at_s), wind_m_s > 0.0));
         }
-        for (flown, course) in still {
-            measured.add(flown, || course.name.clone());
+        for (flown, name, _) in still {
+            measured.add(flown, || name);
         }
         if measured.is_lost() {
             return measured;
@@ -354,7 +343,8 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64, generations: u64) -
     let flown = |plan: &[Leg]| {
         let scenario = Scenario { wind: search::wind_of(plan, wind_m_s), ..alone.clone() };
         let along = plan.iter().map(|leg| leg.wish).find(|wish| wish.norm() > 0.5).unwrap_or(Vector3::x());
-        fly(&scenario, limits, &Course { name: String::new(), along, wishes: wishes(plan) }, DURATION_S)
+        let wishes = Wishes::Until(plan.iter().map(|leg| (leg.until_s, leg.wish)).collect());
+        fly(&scenario, limits, along, &wishes, DURATION_S)
     };
     search::search(&plans, generations, (alone.space, wind_m_s > 0.0), &flown, |flown, line, generation| {
         measured.add(flown, || match generation {
@@ -365,9 +355,9 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64, generations: u64) -
     measured
 }
 
-/// Returns the plan of a course in still air, as flown.
-fn plan(course: &Course, flown: &Flown) -> Plan {
-    let wishes = match &course.wishes {
+/// Returns the plan of a flight in still air.
+fn plan(wishes: &Wishes, flown: &Flown) -> Plan {
+    let wishes = match wishes {
         Wishes::Until(list) => list,
         Wishes::Chase(..) => &flown.wishes,
     };
@@ -377,11 +367,6 @@ fn plan(course: &Course, flown: &Flown) -> Plan {
     plan.push(leg(DURATION_S, Vector3::zeros()));
     search::tidy(&mut plan);
     plan
-}
-
-/// Returns the wishes of a plan.
-fn wishes(plan: &[Leg]) -> Wishes {
-    Wishes::Until(plan.iter().map(|leg| (leg.until_s, leg.wish)).collect())
 }
 
 /// Returns a plan in winds at their bound: constant, turning around before a time \[s\], and turning with the wishes.
@@ -436,36 +421,36 @@ fn directions(space: Space) -> Vec<(&'static str, Vector3<f64>)> {
     all.into_iter().map(|(name, along)| (name, along.normalize())).collect()
 }
 
-/// Returns the courses of a direction that need no measurement.
-fn courses(direction: &str, along: Vector3<f64>) -> Vec<Course> {
-    let course = |name: String, wishes| Course { name, along, wishes };
+/// Returns the sequences of a direction that need no measurement, with their names.
+fn courses(direction: &str, along: Vector3<f64>) -> Vec<(String, Wishes)> {
     vec![
-        course(format!("step along {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, along)])),
-        course(format!("step against {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, -along)])),
-        course(
-            format!("step along {direction} for 4 s, then reversal"),
-            Wishes::Until(vec![(4.0, along), (8.0, -along)]),
-        ),
-        course(format!("chase along {direction}"), Wishes::Chase(along, 0.3)),
-        course(format!("slow chase along {direction}"), Wishes::Chase(along, 1.0)),
+        (format!("step along {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, along)])),
+        (format!("step against {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, -along)])),
+        (format!("step along {direction} for 4 s, then reversal"), Wishes::Until(vec![(4.0, along), (8.0, -along)])),
+        (format!("chase along {direction}"), Wishes::Chase(along, 0.3)),
+        (format!("slow chase along {direction}"), Wishes::Chase(along, 1.0)),
     ]
 }
 
-/// Returns the course that reverses every `half_s` seconds.
-fn reversals(direction: &str, along: Vector3<f64>, half_s: f64) -> Course {
+/// Returns the sequence that reverses every `half_s` seconds.
+fn reversals(direction: &str, along: Vector3<f64>, half_s: f64) -> (String, Wishes) {
     let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
     let count = whole(DURATION_S / half_s);
     let times_s = (0..=count).map(|k| ((k as f64 + 0.5) * half_s, along * sign(k)));
     let name = format!("reversals along {direction} every {} s", significant(half_s, 3));
-    Course { name, along, wishes: Wishes::Until(times_s.collect()) }
+    (name, Wishes::Until(times_s.collect()))
 }
 
-/// Returns the course that makes the largest error of a linear vehicle, from its measured response to a pulse.
-fn matched(alone: &Scenario, limits: &Limits, (direction, along): (&str, Vector3<f64>), period_s: f64) -> Course {
+/// Returns the sequence that makes the largest error of a linear vehicle, from its measured response to a pulse.
+fn matched(
+    alone: &Scenario,
+    limits: &Limits,
+    (direction, along): (&str, Vector3<f64>),
+    period_s: f64,
+) -> (String, Wishes) {
     // The reference goes on without acceleration, so that the error is the response to the pulse alone.
-    let wishes = Wishes::Until(vec![(period_s, along), (RESPONSE_S, COAST)]);
-    let pulse = Course { name: String::new(), along, wishes };
-    let response_m = fly(alone, limits, &pulse, RESPONSE_S).errors_m;
+    let pulse = Wishes::Until(vec![(period_s, along), (RESPONSE_S, COAST)]);
+    let response_m = fly(alone, limits, along, &pulse, RESPONSE_S).errors_m;
     let speeds = (limits.settings().max_speed_m_s / (limits.reference_m_s2() * period_s))
         .min(MOST_CHOICES / response_m.len() as f64);
     let sides = worst_sides(&response_m, whole(speeds));
@@ -481,7 +466,7 @@ fn matched(alone: &Scenario, limits: &Limits, (direction, along): (&str, Vector3
         }
         is_same
     });
-    Course { name: format!("matched to the response along {direction}"), along, wishes: Wishes::Until(wishes) }
+    (format!("matched to the response along {direction}"), Wishes::Until(wishes))
 }
 
 /// Returns the accelerations -1, 0 or 1 of each period whose responses add up to the most at the end. The speed starts
@@ -529,8 +514,8 @@ fn random(seed: u64, space: Space) -> Plan {
     plan
 }
 
-/// Flies a course.
-fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> Flown {
+/// Flies a sequence. Errors are measured along a direction.
+fn fly(alone: &Scenario, limits: &Limits, along: Vector3<f64>, wishes: &Wishes, duration_s: f64) -> Flown {
     let settings = limits.settings();
     let (dt_s, period_s) = (alone.time.dt_s, settings.period_s);
     let steps = whole((period_s / dt_s).round().max(1.0));
@@ -552,19 +537,19 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
         let then = past[past.len() - 1 - settings.measurement_delay_periods.min(past.len() - 1)];
         let reference = shield.next_reference();
         let (away_m, away_m_s) = (reference.position_m - now.position_m, reference.velocity_m_s - now.velocity_m_s);
-        let mut wish = course.wishes.at(time_s, away_m, away_m_s);
+        let mut wish = wishes.at(time_s, away_m, away_m_s);
         if alone.space == Space::Plane && wish.z.is_finite() {
             wish.z = 0.0;
         }
-        if let Wishes::Chase(..) = course.wishes {
-            let along = wish.try_normalize(0.0).filter(|along| along.x.is_finite()).unwrap_or_default();
+        if let Wishes::Chase(..) = wishes {
+            let away = wish.try_normalize(0.0).filter(|away| away.x.is_finite()).unwrap_or_default();
             match flown.wishes.last_mut() {
-                Some((until_s, last)) if last.dot(&along) > SAME_DIRECTION => *until_s = time_s + period_s,
-                _ => flown.wishes.push((time_s + period_s, along)),
+                Some((until_s, last)) if last.dot(&away) > SAME_DIRECTION => *until_s = time_s + period_s,
+                _ => flown.wishes.push((time_s + period_s, away)),
             }
         }
         // The measurement error points against the wish, so that the feedback adds to the acceleration.
-        let side = -wish.try_normalize(0.0).filter(|side| side.x.is_finite()).unwrap_or(course.along);
+        let side = -wish.try_normalize(0.0).filter(|side| side.x.is_finite()).unwrap_or(along);
         let measured = State {
             position_m: then.position_m + side * settings.position_error_m,
             velocity_m_s: then.velocity_m_s + side * settings.velocity_error_m_s,
@@ -597,7 +582,7 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
             plant.write_channels(&mut rotors);
             flown.thrust_share = flown.thrust_share.max(largest_thrust_n(&rotors) / most_n);
             if step + 1 == steps {
-                flown.errors_m.push(error.dot(&course.along));
+                flown.errors_m.push(error.dot(&along));
             }
         }
         plant.apply(&acted, &mut state);
@@ -662,9 +647,10 @@ mod tests {
     #[test]
     fn the_worst_sequence_of_the_table_repeats_its_error() {
         let (alone, limits, tracking) = crazyflies();
-        let course = reversals("y", Vector3::y(), 1.54);
-        let wind = WindSpec { mean_m_s: course.along * -tracking.wind_m_s, ..WindSpec::default() };
-        let flown = fly(&Scenario { wind, ..alone }, &limits, &course, DURATION_S);
+        let along = Vector3::y();
+        let (_, wishes) = reversals("y", along, 1.54);
+        let wind = WindSpec { mean_m_s: along * -tracking.wind_m_s, ..WindSpec::default() };
+        let flown = fly(&Scenario { wind, ..alone }, &limits, along, &wishes, DURATION_S);
         let share = TRACKING_FACTOR * flown.error_m / tracking.error_m;
         // The table was measured in space.
         assert!((0.93..1.0).contains(&share), "{share} of the table");
@@ -676,10 +662,10 @@ mod tests {
     fn the_matched_sequence_is_worse_than_a_step_and_within_the_table() {
         let (alone, limits, tracking) = crazyflies();
         let along = Vector3::x();
-        let [step, ..] = &courses("x", along)[..] else { panic!("courses") };
-        let step = fly(&alone, &limits, step, DURATION_S);
-        let matched = matched(&alone, &limits, ("x", along), limits.settings().period_s);
-        let flown = fly(&alone, &limits, &matched, DURATION_S);
+        let [(_, step), ..] = &courses("x", along)[..] else { panic!("courses") };
+        let step = fly(&alone, &limits, along, step, DURATION_S);
+        let (_, matched) = matched(&alone, &limits, ("x", along), limits.settings().period_s);
+        let flown = fly(&alone, &limits, along, &matched, DURATION_S);
         assert!(flown.error_m > 1.2 * step.error_m, "{} {}", flown.error_m, step.error_m);
         assert!(flown.error_m < tracking.error_m, "{}", flown.error_m);
     }

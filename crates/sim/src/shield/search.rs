@@ -10,7 +10,7 @@ use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 use rayon::prelude::*;
 
 use super::identify::{COAST, DURATION_S, Flown};
-use crate::scenario::Space;
+use crate::scenario::{Space, unit};
 use tautline_laws::wind::{Gust, WindSpec};
 
 /// Number of generations.
@@ -64,7 +64,7 @@ impl Numbers {
 
     /// Returns a number of a range.
     pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+        low + (high - low) * unit(&mut self.0)
     }
 
     /// Returns an index below `count`.
