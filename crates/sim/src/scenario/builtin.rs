@@ -1,6 +1,6 @@
 //! Built-in scenarios, embedded in the program, and the text of new scenario files.
 
-use super::limits::{MAX_NAME_CHARS, is_name_character};
+use super::limits::check_name;
 
 /// Built-in scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,8 +81,7 @@ pub fn find(name: &str) -> Option<&'static Builtin> {
 /// and lines such as `#key = value` are optional keys.
 #[must_use]
 pub fn new_scenario(name: &str, from: Option<&Builtin>) -> Option<String> {
-    let is_name = (1..=MAX_NAME_CHARS).contains(&name.len()) && name.chars().all(is_name_character);
-    is_name.then(|| match from {
+    check_name("the name", name, "name").is_ok().then(|| match from {
         Some(builtin) => {
             builtin.toml.replacen(&format!("\nname = \"{}\"", builtin.name), &format!("\nname = \"{name}\""), 1)
         }

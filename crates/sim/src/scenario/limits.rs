@@ -37,6 +37,19 @@ pub(super) fn is_name_character(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '-' || c == '_'
 }
 
+/// Refuses a name that is not 1 to [`MAX_NAME_CHARS`] letters, digits, `-` and `_`. `what` describes it, `key` is its
+/// key.
+pub(super) fn check_name(what: &str, name: &str, key: &str) -> Result<(), ScenarioError> {
+    let problem = match name.chars().find(|&c| !is_name_character(c)) {
+        Some(c) => format!("{what} contains {c:?}"),
+        None if name.is_empty() => format!("{what} is empty"),
+        None if name.len() > MAX_NAME_CHARS => format!("{what} has {} characters", name.len()),
+        None => return Ok(()),
+    };
+    let help = format!("use 1 to {MAX_NAME_CHARS} letters, digits, `-` and `_`");
+    Err(ErrorKind::Name.at(&[key], problem, help))
+}
+
 /// Limit of the expected memory of a flight \[bytes\].
 pub const MAX_MEMORY_BYTES: u128 = 8 << 30;
 

@@ -10,7 +10,7 @@ use super::document::{Document, StartShape, StartTable};
 use super::error::suggest;
 use super::error::{ErrorKind, ScenarioError};
 use super::external::ExternalLaw;
-use super::limits::{MAX_NAME_CHARS, is_name_character};
+use super::limits::check_name;
 use super::source::{Source, decoded, finish};
 use super::spec::Scenario;
 use super::text::Override;
@@ -232,7 +232,7 @@ fn keys(law: &LawSpec) -> (String, Table) {
 pub(super) fn check_laws(laws: &Laws) -> Result<(), ScenarioError> {
     let kinds: Vec<_> = LawSpec::all().iter().map(kind).collect();
     for (name, OtherLaw { kind: law }) in laws {
-        check_name(name)?;
+        check_name("the name of a law", name, &format!("laws.{name}"))?;
         let kind = kind(law);
         if *name != kind && kinds.contains(name) {
             let problem = format!("the law {name} has the name of a kind, but is of the kind {kind}");
@@ -241,15 +241,4 @@ pub(super) fn check_laws(laws: &Laws) -> Result<(), ScenarioError> {
         }
     }
     Ok(())
-}
-
-fn check_name(name: &str) -> Result<(), ScenarioError> {
-    let help = format!("use 1 to {MAX_NAME_CHARS} letters, digits, `-` and `_`");
-    let said = match name.chars().find(|&c| !is_name_character(c)) {
-        Some(c) => format!("the name of a law contains {c:?}"),
-        None if name.is_empty() => "the name of a law is empty".to_owned(),
-        None if name.len() > MAX_NAME_CHARS => format!("the name of a law has {} characters", name.len()),
-        None => return Ok(()),
-    };
-    Err(ErrorKind::Name.at(&[&format!("laws.{name}")], said, help))
 }

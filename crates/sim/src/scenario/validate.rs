@@ -6,8 +6,8 @@ use super::check::{check_written, of_filled_value};
 use super::document::Document;
 use super::error::{ErrorKind, ScenarioError, entry_key, leg_key};
 use super::limits::{
-    CONTACT_PREDICTION_M, LARGEST, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
-    first_pair_within, is_name_character,
+    CONTACT_PREDICTION_M, LARGEST, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory, check_name,
+    first_pair_within,
 };
 use super::spec::{Safety, Scenario, Space};
 use super::time::TimeSpec;
@@ -70,7 +70,7 @@ impl Scenario {
 
     /// Checks conditions on several keys; the schema checks single keys.
     fn check(&self) -> Result<(), ScenarioError> {
-        check_name(&self.name)?;
+        check_name("the name", &self.name, "name")?;
         check_count(self.count())?;
         self.check_legs()?;
         self.check_lengths()?;
@@ -548,19 +548,6 @@ fn check_size(what: &str, number: f64) -> Result<(), ScenarioError> {
         _ => (format!("{what} must be at most {LARGEST:e} in magnitude, got {number:e}"), "give a smaller number"),
     };
     Err(ErrorKind::OutOfRange.at(&[], problem, help))
-}
-
-fn check_name(name: &str) -> Result<(), ScenarioError> {
-    let said = if name.is_empty() {
-        "the name is empty".to_owned()
-    } else if name.chars().count() > MAX_NAME_CHARS {
-        format!("the name has more than {MAX_NAME_CHARS} characters")
-    } else if let Some(bad) = name.chars().find(|&c| !is_name_character(c)) {
-        format!("the name contains {bad:?}")
-    } else {
-        return Ok(());
-    };
-    Err(ErrorKind::Name.at(&["name"], said, "it names a folder: use letters, digits, `-` and `_`"))
 }
 
 /// Refuses a graph in which some vehicle cannot be reached from vehicle 1.

@@ -133,9 +133,7 @@ impl VehicleTable {
             ModelKey::Given(model) => Model::clone(model),
             ModelKey::Named(name) => {
                 let known = MODELS.map(|(known, _)| known);
-                let found = MODELS.iter().find(|(known, _)| known == name);
-                let found = found.and_then(|(name, text)| vehicle::read(name, text).ok());
-                found.ok_or_else(|| {
+                vehicle::built_in(name).ok_or_else(|| {
                     let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
                     let help = format!("{}; for another model give the path of a TOML file", suggest(name, &known));
                     let problem = format!("no model has the name `{name}`");

@@ -3,7 +3,7 @@
 use super::search::CHANGED_FLIGHTS;
 use super::{SAME, ShieldSpec, TRACKING_FACTOR, refused};
 use crate::scenario::{ErrorKind, Scenario, ScenarioError, Space};
-use crate::vehicle::{self, MODELS, Quadrotor, Tracking, TrackingSearch};
+use crate::vehicle::{self, Quadrotor, Tracking, TrackingSearch};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::IDENTIFY;
 use tautline_core::text::shortest;
@@ -204,8 +204,7 @@ impl Scenario {
     /// measurement is that of the built-in model.
     fn other_attitude_loop(&self) -> Option<(&'static str, f64, f64)> {
         let Quadrotor { model, .. } = self.airframe.quadrotor()?;
-        let (name, text) = MODELS.iter().find(|(name, _)| *name == model.name)?;
-        let measured = vehicle::read(name, text).ok().filter(|measured| measured.tracking.is_some())?;
+        let measured = vehicle::built_in(&model.name).filter(|measured| measured.tracking.is_some())?;
         let keys = [
             ("vehicle.attitude_rad_s", measured.attitude_rad_s, model.attitude_rad_s),
             ("vehicle.attitude_damping", measured.attitude_damping, model.attitude_damping),

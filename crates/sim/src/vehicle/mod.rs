@@ -17,7 +17,7 @@ mod unicycle;
 
 pub use dynamics::{Attitude, Drift, Dynamics, Ground, LEAST_LIFT, State, THRUST_RESERVE, Wrench};
 pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
-pub use model::{GRAVITY_M_S2, MODELS, Model, Quadrotor, RotorDirection, read};
+pub use model::{GRAVITY_M_S2, MODELS, Model, Quadrotor, RotorDirection, built_in, read};
 pub use rotors::{AIR_DENSITY_KG_M3, Downwash, Mixer, RotorCurve, RotorLag};
 pub use tracking::{Tracking, TrackingSearch};
 pub use unicycle::{Heading, Steering, Unicycle};

@@ -1,14 +1,15 @@
 //! Parameters of a quadrotor, and their checks.
 
-use std::ops::Range;
+use std::sync::LazyLock;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use toml::de::DeTable;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use super::rotors::Mixer;
 use super::tracking::Tracking;
-use crate::scenario::{ErrorKind, ScenarioError};
+use crate::scenario::{ErrorKind, ScenarioError, TomlSchema};
 use tautline_core::failure::Place;
 use tautline_core::option::IDENTIFY;
 
@@ -131,19 +132,31 @@ pub const MODELS: [(&str, &str); 3] = [
 /// # Errors
 /// [`ScenarioError`] with its place if the text is not TOML, has a missing or unknown key, or the model is invalid.
 pub fn read(name: &str, text: &str) -> Result<Model, ScenarioError> {
-    let placed = |error: ScenarioError, span: Option<Range<usize>>| {
-        error.with_place(Place::new(name, text, span.unwrap_or_default()))
+    static KEYS: LazyLock<TomlSchema> = LazyLock::new(TomlSchema::of::<Model>);
+    let locate = |span| Place::new(name, text, span);
+    let read = || {
+        let not_toml = |error: toml::de::Error| {
+            let help = "a model has the keys of the built-in ones, which docs/scenario.md lists";
+            ErrorKind::File.at(&[], error.message(), help).with_place(locate(error.span().unwrap_or_default()))
+        };
+        let keys = DeTable::parse(text).map_err(not_toml)?;
+        let mut file = Spanned::new(0..0, DeValue::Table(keys.get_ref().clone()));
+        KEYS.check("model", &mut file, &locate)?;
+        let model: Model = toml::from_str(text).map_err(not_toml)?;
+        model.check().map_err(|error| {
+            let span = error.keys.first().and_then(|key| Some(keys.get_ref().get(&**key)?.span()));
+            error.with_place(locate(span.unwrap_or_default()))
+        })?;
+        Ok(model)
     };
-    let model: Model = toml::from_str(text).map_err(|error| {
-        let help = "a model has the keys of the built-in ones, which docs/scenario.md lists";
-        placed(ErrorKind::File.at(&[], error.message(), help), error.span())
-    })?;
-    model.check().map_err(|error| {
-        let table = DeTable::parse(text).ok();
-        let span = table.and_then(|table| Some(table.get_ref().get(&*error.keys[0])?.span()));
-        placed(ScenarioError { kind: ErrorKind::File, ..error }, span)
-    })?;
-    Ok(model)
+    read().map_err(|error: ScenarioError| ScenarioError { kind: ErrorKind::File, ..error })
+}
+
+/// Returns the built-in model with a name.
+#[must_use]
+pub fn built_in(name: &str) -> Option<Model> {
+    let (name, text) = MODELS.iter().find(|(known, _)| *known == name)?;
+    read(name, text).ok()
 }
 
 /// Smallest and largest magnitude of a positive number of a model, in its unit.
@@ -234,23 +247,11 @@ impl Model {
                 format!("it must be from 0 to {most:e}"),
             ));
         }
-        if let Some(tracking) = &self.tracking {
-            let (positive, from_zero) = tracking.numbers();
-            let wrong = |least: f64| move |number: &f64| !(least..=most).contains(number);
-            let found = positive.into_iter().find(wrong(least)).or_else(|| from_zero.into_iter().find(wrong(0.0)));
-            if let Some(number) = found {
-                let help = format!("its numbers must be from {least:e} to {most:e}; pushes, wind and errors may be 0");
-                return Err(ErrorKind::Inconsistent.at(
-                    &["tracking"],
-                    format!("the table has the number {number}"),
-                    help,
-                ));
-            }
-            if let Some(problem) = tracking.search.as_ref().and_then(|search| search.contradiction(tracking.error_m)) {
-                let command = format!("tautline check {}", IDENTIFY.argument());
-                let help = format!("measure the table with `{command}`, or leave out tracking.search");
-                return Err(ErrorKind::Inconsistent.at(&["tracking"], problem, help));
-            }
+        let of_search = |tracking: &Tracking| tracking.search.as_ref()?.contradiction(tracking.error_m);
+        if let Some(problem) = self.tracking.as_ref().and_then(of_search) {
+            let command = format!("tautline check {}", IDENTIFY.argument());
+            let help = format!("measure the table with `{command}`, or leave out tracking.search");
+            return Err(ErrorKind::Inconsistent.at(&["tracking"], problem, help));
         }
         let places = self.rotor_positions_m.iter().flatten().map(|&place| ("rotor_positions_m", place));
         let mut others = places.chain([("thrust_n_per_rpm", self.thrust_n_per_rpm)]);
@@ -298,8 +299,8 @@ mod tests {
             ("max_thrust_n = 0.12", "max_thrust_n = 0.08", "not more than the weight of 0.321658 N"),
             ("attitude_rad_s = 6.0", "attitude_rad_s = 31.0", "2 zeta > omega tau"),
             ("\"ccw\", \"cw\", \"ccw\", \"cw\"", "\"cw\", \"cw\", \"cw\", \"cw\"", "independently"),
-            ("lag_up_s = 0.065", "lag_up_s = nan", "lag_up_s is NaN"),
-            ("ground_effect = 11", "ground_effects = 11", "unknown field `ground_effects`"),
+            ("lag_up_s = 0.065", "lag_up_s = nan", "`lag_up_s` must be a finite number, got nan"),
+            ("ground_effect = 11", "ground_effects = 11", "unknown key `ground_effects`"),
         ] {
             let wrong = text.replace(before, after);
             assert_ne!(wrong, text, "{before}");

@@ -94,30 +94,12 @@ const FINGERPRINT_DIGITS: usize = 16;
 impl TrackingSearch {
     /// Returns why the search does not support a bound \[m\].
     pub(super) fn contradiction(&self, error_m: f64) -> Option<String> {
-        let &Self { flights, largest_error_m, margin, .. } = self;
-        if flights == 0 {
-            return Some("tracking.search.flights is 0".to_owned());
-        }
-        if !(margin >= 1.0 && margin.is_finite()) {
-            return Some(format!("tracking.search.margin is {margin}, less than 1"));
-        }
+        let &Self { largest_error_m, margin, .. } = self;
         let needed_m = margin * largest_error_m;
         let is_covered = needed_m > 0.0 && needed_m <= error_m * (1.0 + ROUNDING);
         (!is_covered).then(|| {
             format!("tracking.error_m is {error_m}, not at least {margin} times the largest error {largest_error_m}")
         })
-    }
-}
-
-impl Tracking {
-    /// Returns the values of the keys that must be above 0, and of those that may be 0.
-    pub(super) fn numbers(&self) -> ([f64; 8], [f64; 4]) {
-        let &Self { error_m, accel_m_s2, max_speed_m_s, tracker_per_s2, tracker_per_s, control_hz, .. } = self;
-        let &Self { attitude_hz, dt_s, disturbance_m_s2, wind_m_s, position_error_m, velocity_error_m_s, .. } = self;
-        (
-            [error_m, accel_m_s2, max_speed_m_s, tracker_per_s2, tracker_per_s, control_hz, attitude_hz, dt_s],
-            [disturbance_m_s2, wind_m_s, position_error_m, velocity_error_m_s],
-        )
     }
 }
 

@@ -187,9 +187,9 @@ fn a_table_that_its_search_contradicts_is_refused() {
     let error_m = model("crazyflie").tracking.expect("a table").error_m;
     for (key, value, says) in [
         ("error_m", "0.2", "not at least 1.25 times the largest error"),
-        ("flights", "0", "flights is 0"),
-        ("margin", "0.9", "margin is 0.9, less than 1"),
-        ("largest_error_m", "nan", "not at least"),
+        ("flights", "0", "`flights` must be at least 1, got 0"),
+        ("margin", "0.9", "`margin` must be at least 1, got 0.9"),
+        ("largest_error_m", "nan", "`largest_error_m` must be a finite number, got nan"),
     ] {
         let lines = text.lines().map(|line| match line.split_once(" = ") {
             Some((name, _)) if name == key => format!("{key} = {value}"),
