@@ -79,11 +79,8 @@ impl ImperfectionSpec for Vec<Failure> {
                 let problem =
                     format!("at_s must be from 0 s to less than {} s, got {at_s} s", scenario.time.duration_s);
                 let help = "give a time within the flight";
-                return Err(ErrorKind::OutsideFlight.at(
-                    &[&entry_key("failure", entry), "time.duration_s"],
-                    problem,
-                    help,
-                ));
+                let keys = [&*entry_key("failure", entry), "time.duration_s"];
+                return Err(ErrorKind::OutsideFlight.at(&keys, problem, help));
             }
             match kind {
                 FailureKind::Dead {} => {}

@@ -25,6 +25,13 @@ struct ReceivedMessage {
     measured_s: f64,
 }
 
+impl ReceivedMessage {
+    /// Returns the state in the message, with its age at a time \[s\].
+    fn at(&self, time_s: f64) -> NeighbourState {
+        NeighbourState { age_s: (time_s - self.measured_s).max(0.0), ..self.neighbour }
+    }
+}
+
 /// Network of a flight: messages under way, and the last message received over each link.
 ///
 /// All vehicles send message k to all neighbours k/`rate_hz` after the first measurement is available. It holds the
@@ -127,8 +134,7 @@ impl Messages {
 
     /// Returns the last state of vehicle `j` that vehicle `i` received, at a time \[s\]; `None` without a link.
     pub(super) fn received(&self, i: usize, j: usize, time_s: f64) -> Option<NeighbourState> {
-        let received = self.received[self.links.find(i, j)?];
-        Some(NeighbourState { age_s: (time_s - received.measured_s).max(0.0), ..received.neighbour })
+        Some(self.received[self.links.find(i, j)?].at(time_s))
     }
 
     /// Returns the largest distance \[m\] of a received position from the true position of its sender.
@@ -141,11 +147,7 @@ impl Messages {
         (0..self.links.count()).fold(0.0, |largest_error_m, sender| {
             let place_m = row(positions_m, sender);
             self.links.from(sender).fold(largest_error_m, |largest_error_m: f64, (link, _)| {
-                let received = self.received[link];
-                let held = extrapolated(NeighbourState {
-                    age_s: (time_s - received.measured_s).max(0.0),
-                    ..received.neighbour
-                });
+                let held = extrapolated(self.received[link].at(time_s));
                 largest_error_m.max((held.position_m - place_m).norm())
             })
         })
@@ -156,7 +158,7 @@ impl Messages {
         oldest_and_mean_s.fill(0.0);
         for sender in 0..self.links.count() {
             for (link, receiver) in self.links.from(sender) {
-                let age_s = (time_s - self.received[link].measured_s).max(0.0);
+                let age_s = self.received[link].at(time_s).age_s;
                 let [oldest_s, sum_s] = [2 * receiver, 2 * receiver + 1];
                 oldest_and_mean_s[oldest_s] = oldest_and_mean_s[oldest_s].max(age_s);
                 oldest_and_mean_s[sum_s] += age_s;

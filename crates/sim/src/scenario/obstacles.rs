@@ -265,11 +265,8 @@ impl Scenario {
             obstacle.clearance_m
         );
         let help = "enlarge the clearance_m of the obstacle, or reduce swarm.hull_radius_m";
-        Err(ErrorKind::HullsTouch.at(
-            &[&entry_key("obstacle", number), &entry_key("swarm.hull_radius_m", vehicle)],
-            problem,
-            help,
-        ))
+        let keys = [&*entry_key("obstacle", number), &entry_key("swarm.hull_radius_m", vehicle)];
+        Err(ErrorKind::HullsTouch.at(&keys, problem, help))
     }
 }
 

@@ -140,11 +140,11 @@ impl ReferenceTable {
             })
         };
         match (&self.known_by, self.leader) {
-            (Some(_), Some(_)) => Err(ErrorKind::ExclusiveKeys.at(
-                &["reference.leader", "reference.known_by"],
-                "both `known_by` and `leader` are given",
-                "keep one of them: only the leader knows its reference",
-            )),
+            (Some(_), Some(_)) => {
+                let problem = "both `known_by` and `leader` are given";
+                let help = "keep one of them: only the leader knows its reference";
+                Err(ErrorKind::ExclusiveKeys.at(&["reference.leader", "reference.known_by"], problem, help))
+            }
             (None, Some(leader)) => Ok(Pinning::Leader(index(leader, "reference.leader")?)),
             (None | Some(Vehicles::All(All::All)), None) => Ok(Pinning::All),
             (Some(Vehicles::Listed(listed)), None) => {
@@ -196,11 +196,8 @@ impl ReferenceKind {
                     _ => {
                         let problem = "way points need either `times_s` or `speed_m_s`";
                         let help = "give the time at each point, or the largest speed between them";
-                        return Err(ErrorKind::MissingKey.at(
-                            &["reference.times_s", "reference.speed_m_s", "reference.points_m"],
-                            problem,
-                            help,
-                        ));
+                        let keys = ["reference.times_s", "reference.speed_m_s", "reference.points_m"];
+                        return Err(ErrorKind::MissingKey.at(&keys, problem, help));
                     }
                 };
                 ReferenceMotion::WayPoints { points: in_time(&points_m, &times_s)? }
@@ -211,11 +208,8 @@ impl ReferenceKind {
                 check_steady(&points)?;
                 let spline = Spline::through(&points).ok_or_else(|| {
                     let problem = "no curve goes through the points";
-                    ErrorKind::Reference.at(
-                        &["reference.points_m"],
-                        problem,
-                        "give finite points, and times that increase",
-                    )
+                    let help = "give finite points, and times that increase";
+                    ErrorKind::Reference.at(&["reference.points_m"], problem, help)
                 })?;
                 ReferenceMotion::Table(spline)
             }

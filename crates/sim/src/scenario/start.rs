@@ -87,11 +87,8 @@ pub fn scatter(
                 i + 1
             );
             let help = "enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles";
-            return Err(ErrorKind::NoRoom.at(
-                &["start.half_extent_m", "start.min_separation_m", "swarm.count"],
-                problem,
-                help,
-            ));
+            let keys = ["start.half_extent_m", "start.min_separation_m", "swarm.count"];
+            return Err(ErrorKind::NoRoom.at(&keys, problem, help));
         };
         set_row(&mut positions_m, i, position);
     }

@@ -181,10 +181,11 @@ fn value_at<'t, 'a>(root: &'t Spanned<DeValue<'a>>, path: &str) -> (Option<&'t S
             DeValue::Table(table) => {
                 table.iter().find_map(|(key, value)| Some((key.span(), value, after(rest, key.get_ref())?)))
             }
-            DeValue::Array(list) => list
-                .iter()
-                .zip(1..)
-                .find_map(|(value, number): (_, usize)| Some((value.span(), value, after(rest, &number.to_string())?))),
+            DeValue::Array(list) => {
+                let (number, rest) = rest.split_once('.').unwrap_or((rest, ""));
+                let entry = number.parse::<usize>().ok().and_then(|number| list.get(number.checked_sub(1)?));
+                entry.map(|value| (value.span(), value, rest))
+            }
             _ => None,
         };
         let Some(next) = next else { return (None, span) };

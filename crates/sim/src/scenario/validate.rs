@@ -109,11 +109,11 @@ impl Scenario {
                 let key = number.map_or_else(|| "obstacle".to_owned(), |number| entry_key("obstacle", number));
                 ErrorKind::Obstacle.at(&[&key], problem, help)
             }
-            _ => ErrorKind::OutOfRange.at(
-                &["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"],
-                error.to_string(),
-                "choose a safety distance and a number of vehicles that can be judged",
-            ),
+            _ => {
+                let keys = ["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"];
+                let help = "choose a safety distance and a number of vehicles that can be judged";
+                ErrorKind::OutOfRange.at(&keys, error.to_string(), help)
+            }
         }
     }
 
@@ -159,11 +159,8 @@ impl Scenario {
                     "legs must begin in order, at {from_s} s or later and before the end of the flight at {} s",
                     self.time.duration_s
                 );
-                return Err(ErrorKind::OutsideFlight.at(
-                    &[&leg_key(number, "start_s"), "time.duration_s"],
-                    problem,
-                    help,
-                ));
+                let keys = [&*leg_key(number, "start_s"), "time.duration_s"];
+                return Err(ErrorKind::OutsideFlight.at(&keys, problem, help));
             }
             from_s = start_s;
         }
@@ -350,11 +347,8 @@ impl Scenario {
             }
             _ => format!("law.delta_m must be more than {CONTACT_PREDICTION_M} m"),
         };
-        Err(ErrorKind::HullsTouch.at(
-            &[&entry_key("swarm.hull_radius_m", i), &entry_key("swarm.hull_radius_m", j), "law.delta_m"],
-            problem,
-            help,
-        ))
+        let hulls = [i, j].map(|i| entry_key("swarm.hull_radius_m", i));
+        Err(ErrorKind::HullsTouch.at(&[&hulls[0], &hulls[1], "law.delta_m"], problem, help))
     }
 
     fn check_time(&self) -> Result<(), ScenarioError> {

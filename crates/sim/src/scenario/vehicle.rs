@@ -353,11 +353,9 @@ impl Scenario {
                     i + 1
                 );
                 let help = "give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed";
-                return Err(ErrorKind::OutOfRange.at(
-                    &[&entry_key("start.velocities_m_s", i), "vehicle.min_speed_m_s", "vehicle.model"],
-                    problem,
-                    help,
-                ));
+                let start = entry_key("start.velocities_m_s", i);
+                let keys = [&*start, "vehicle.min_speed_m_s", "vehicle.model"];
+                return Err(ErrorKind::OutOfRange.at(&keys, problem, help));
             }
         }
         Ok(())

@@ -241,11 +241,8 @@ impl Model {
         let squared = self.parasitic_drag_n_s2_m2.map(|drag| ("parasitic_drag_n_s2_m2", drag));
         let mut from_zero = from_zero.into_iter().chain(squared).chain([("ground_effect", self.ground_effect)]);
         if let Some((key, number)) = from_zero.find(|(_, number)| !(0.0..=most).contains(number)) {
-            return Err(ErrorKind::Inconsistent.at(
-                &[key],
-                format!("{key} is {number}"),
-                format!("it must be from 0 to {most:e}"),
-            ));
+            let help = format!("it must be from 0 to {most:e}");
+            return Err(ErrorKind::Inconsistent.at(&[key], format!("{key} is {number}"), help));
         }
         let of_search = |tracking: &Tracking| tracking.search.as_ref()?.contradiction(tracking.error_m);
         if let Some(problem) = self.tracking.as_ref().and_then(of_search) {

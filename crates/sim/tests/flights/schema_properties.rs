@@ -198,18 +198,16 @@ fn fault_of_refusal(error: &ScenarioError, paths: &[String]) -> Option<String> {
     let shown = error.to_string();
     let is_key = |key: &str| {
         let table = [format!("{key}."), format!("{key}.1.")];
-        paths.iter().any(|path| path == key || table.iter().any(|table| path.starts_with(table)))
+        // The model of a vehicle is one path, but may be a table.
+        let is_within = |path: &String| key.strip_prefix(path.as_str()).is_some_and(|rest| rest.starts_with('.'));
+        paths.iter().any(|path| path == key || is_within(path) || table.iter().any(|table| path.starts_with(table)))
     };
-    // Entries of lists have the number 1 in the paths of the schema.
+    // Entries of lists of tables have the number 1 in paths.
     let first_entries = |key: &str| {
         let parts = key.split('.').map(|part| if part.parse::<u64>().is_ok() { "1" } else { part });
         parts.collect::<Vec<_>>().join(".")
     };
-    let unknown = error.keys.first().filter(|key| {
-        let key = first_entries(key);
-        let list = key.trim_end_matches(".1");
-        !is_key(&key) && !is_key(list)
-    });
+    let unknown = error.keys.first().filter(|key| !is_key(first_entries(key).trim_end_matches(".1")));
     if error.place.is_none() {
         return Some(format!("without a place: {shown}"));
     }
