@@ -19,9 +19,9 @@ pub struct ScenarioError {
     pub message: String,
     /// The remedy.
     pub help: String,
-    /// Keys that are part of the problem, as an override names them: `start.positions_m.2` is the position of vehicle 2,
-    /// and `leg.1.points_m.2` its slot in the first `[[leg]]`. The error is placed at the first one, unless an override
-    /// set another one.
+    /// Keys that are part of the problem, as an override names them: `start.positions_m.2` is the position of vehicle
+    /// 2, and `leg.1.points_m.2` its slot in the first `[[leg]]`. The error is placed at the first one, unless an
+    /// override set another one.
     pub keys: Vec<String>,
     /// Place in the text; `None` for a scenario built in code, and for a file that could not be read.
     pub place: Option<Box<Place>>,
