@@ -101,20 +101,15 @@ impl Scenario {
 
     /// Returns an error of the judge at its key.
     fn of_judge(&self, error: &SimError) -> ScenarioError {
-        match error {
-            SimError::Obstacle(ObstacleError { name, .. }) => {
-                let problem = error.to_string();
-                let help = "correct the shape, the position or the clearance_m of the obstacle";
-                let number = self.obstacles.iter().position(|obstacle| obstacle.name == *name);
-                let key = number.map_or_else(|| "obstacle".to_owned(), |number| entry_key("obstacle", number));
-                ErrorKind::Obstacle.at(&[&key], problem, help)
-            }
-            _ => {
-                let keys = ["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"];
-                let help = "choose a safety distance and a number of vehicles that can be judged";
-                ErrorKind::OutOfRange.at(&keys, error.to_string(), help)
-            }
+        if let SimError::Obstacle(ObstacleError { name, .. }) = error {
+            let help = "correct the shape, the position or the clearance_m of the obstacle";
+            let number = self.obstacles.iter().position(|obstacle| obstacle.name == *name);
+            let key = number.map_or_else(|| "obstacle".to_owned(), |number| entry_key("obstacle", number));
+            return ErrorKind::Obstacle.at(&[&key], error.to_string(), help);
         }
+        let keys = ["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"];
+        let help = "choose a safety distance and a number of vehicles that can be judged";
+        ErrorKind::OutOfRange.at(&keys, error.to_string(), help)
     }
 
     fn check_noise(&self) -> Result<(), ScenarioError> {
