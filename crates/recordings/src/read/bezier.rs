@@ -13,13 +13,12 @@ use std::str;
 use nalgebra::Vector3;
 
 use super::cells::parse_number;
-use super::crazyflie::{Curve, curves_of};
-use super::curves::{Curves, HIGHEST_DEGREE, powers};
+use super::curves::{Curve, Curves, HIGHEST_DEGREE, curves_of, note_of_starts, powers};
 use super::error::{ContentKind, Fault, ReadError, UNSEEN, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::source::{Lines, Source};
-use tautline_core::track::{Item, Metadata};
+use super::source::{Lines, Source, VehicleFiles};
+use tautline_core::track::Metadata;
 
 /// Degree of the pieces if the header does not give the axes.
 const USUAL_DEGREE: usize = 7;
@@ -29,7 +28,7 @@ const HEADER: &str = "write the header duration,p0x,p0y,p0z,p1x,..., with the ax
 /// Opens the curves of these vehicles; the files of a vehicle are flown in sequence. `left_out` is the note on other
 /// files.
 pub(super) fn open(
-    vehicles: Vec<(String, Vec<Source>)>,
+    vehicles: VehicleFiles,
     left_out: Option<String>,
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
@@ -38,14 +37,10 @@ pub(super) fn open(
         is_planar |= append(curve, file)?;
         Ok(())
     };
-    let (mut curves, mut notes) = curves_of(vehicles, left_out, options, append)?;
+    let (curves, mut notes) = curves_of(vehicles, left_out, options, append)?;
+    notes.extend(note_of_starts(&curves));
     if is_planar {
         notes.push("points without z: the recording is judged in the plane of x and y".to_owned());
-        for item in curves.iter_mut().flat_map(|(_, items)| items) {
-            if let Item::Piece(piece) = item {
-                piece.coefficients.iter_mut().for_each(|coefficient| coefficient.z = 0.0);
-            }
-        }
     }
     Ok(Curves::with_metadata(curves, Metadata { is_planar, ..Metadata::in_seconds(notes) }))
 }

@@ -5,62 +5,51 @@
 
 use std::io::Read as _;
 
-use super::curves::{Curves, piece, powers, stand_throughout};
+use super::curves::{Curve, Curves, curves_of, piece, powers, stand_throughout};
 use super::error::{ContentKind, Fault, Place, ReadError, refuse};
 use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::source::Source;
+use super::source::{Source, VehicleFiles};
 use crate::export::drones::fit::seconds;
 use crate::export::drones::skybrush as skyb;
 use crate::segments::{Trajectory, Truncated};
 use tautline_core::track::{Item, Sample};
 
-pub(super) fn open_crazyflie(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    open(std::slice::from_ref(source), crazyflie, None, options)
-}
-
-pub(super) fn open_skyb(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    open(std::slice::from_ref(source), skybrush, None, options)
-}
-
-/// Opens a folder with one vehicle in each file; `left_out` is the note on other files.
-pub(super) fn open_folder(
-    format: Format,
-    files: &[Source],
+pub(super) fn open_crazyflie(
+    vehicles: VehicleFiles,
     left_out: Option<String>,
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
-    open(files, if format == Format::SKYB { skybrush } else { crazyflie }, left_out, options)
+    open(vehicles, crazyflie, left_out, options)
 }
 
-/// Returns whether files of a format hold compressed segments.
-pub(super) fn is_compressed(format: Format) -> bool {
-    format == Format::SKYB || format == Format::CRAZYFLIE_COMPRESSED
+pub(super) fn open_skyb(
+    vehicles: VehicleFiles,
+    left_out: Option<String>,
+    options: &ReadOptions,
+) -> Result<Recording, ReadError> {
+    open(vehicles, skybrush, left_out, options)
 }
 
 /// Trajectory of a file, with its unit of length \[m\].
 type Decoded = (Trajectory, f64);
 
 fn open(
-    files: &[Source],
+    vehicles: VehicleFiles,
     decode: fn(&[u8]) -> Result<Decoded, ReadError>,
     left_out: Option<String>,
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
-    let mut curves = Vec::with_capacity(files.len());
-    for (vehicle, file) in files.iter().enumerate() {
-        let of_file = || {
-            let mut bytes = Vec::new();
-            file.bytes()?.read_to_end(&mut bytes)?;
-            let (trajectory, unit_m) = decode(&bytes)?;
-            items(vehicle, &trajectory, unit_m, options)
-        };
-        let items = of_file().map_err(|error| error.of(&file.display_path()));
-        curves.push((file.stem(), items.map_err(|error| if files.len() > 1 { error.among_others() } else { error })?));
-    }
+    let append = |curve: &mut Curve, file: &Source| {
+        let mut bytes = Vec::new();
+        file.bytes()?.read_to_end(&mut bytes)?;
+        let (trajectory, unit_m) = decode(&bytes)?;
+        append(curve, &trajectory, unit_m)
+    };
+    let (mut curves, notes) = curves_of(vehicles, left_out, options, append)?;
     stand_throughout(curves.iter_mut().map(|(_, items)| items));
-    Ok(Curves::recording(curves, left_out.into_iter().collect()))
+    Ok(Curves::recording(curves, notes))
 }
 
 fn crazyflie(bytes: &[u8]) -> Result<Decoded, ReadError> {
@@ -141,26 +130,26 @@ fn trajectory_block(bytes: &[u8], mut offset: usize) -> Result<(usize, &[u8]), R
     refuse(ContentKind::NoPositions, "it has no trajectory", "export the show with the paths of its drones")
 }
 
-/// Returns the items of a vehicle.
-fn items(vehicle: usize, trajectory: &Trajectory, unit_m: f64, options: &ReadOptions) -> Result<Vec<Item>, ReadError> {
-    let (mut items, mut from_ms, scale) = (Vec::new(), 0, options.metres());
+/// Adds the segments of a trajectory to the curve of its vehicle.
+fn append(curve: &mut Curve, trajectory: &Trajectory, unit_m: f64) -> Result<(), ReadError> {
+    let (mut from_ms, scale) = (0, curve.scale);
     for (duration_ms, points) in trajectory.curves(unit_m) {
         let to_ms = from_ms + u64::from(duration_ms);
         // A segment without a duration is a jump to the start of the next one.
         if duration_ms > 0 {
             let (from_s, to_s) = (seconds(from_ms), seconds(to_ms));
             let coefficients = powers(&points, to_s - from_s);
-            let piece = piece(vehicle, from_s, to_s, coefficients, scale).ok_or_else(Fault::out_of_range)?;
-            items.push(Item::Piece(piece));
+            let piece = piece(curve.vehicle, from_s, to_s, coefficients, scale).ok_or_else(Fault::out_of_range)?;
+            curve.items.push(Item::Piece(piece));
         }
         from_ms = to_ms;
     }
-    if items.is_empty() {
+    if curve.items.is_empty() {
         let [x, y, z, _] = trajectory.start.map(|number| f64::from(number) * unit_m * scale);
-        let position_m = [x, y, z].into();
-        items.push(Item::Sample(Sample { vehicle, time_s: 0.0, position_m, velocity_m_s: None, radius_m: None }));
+        let (vehicle, position_m) = (curve.vehicle, [x, y, z].into());
+        curve.items.push(Item::Sample(Sample { vehicle, time_s: 0.0, position_m, velocity_m_s: None, radius_m: None }));
     }
-    Ok(items)
+    Ok(())
 }
 
 /// Returns the error of an incomplete segment of a body that begins at an offset.

@@ -5,8 +5,11 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use serde::de::DeserializeOwned;
 
-use super::error::{ContentKind, Fault, Place, ReadError};
+use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
+use super::options::ReadOptions;
 use super::order::{BATCH, Recording};
+use super::source::{Source, VehicleFiles};
+use tautline_core::option::START;
 use tautline_core::track::{Item, Metadata, Piece, Sample, Tracks};
 
 /// Smallest jump between two pieces of a curve that is reported \[m\]. Files round to micrometres.
@@ -61,6 +64,78 @@ impl Tracks for Curves {
     fn metadata(&self) -> &Metadata {
         &self.metadata
     }
+}
+
+/// Curve of a vehicle, as read so far.
+pub(super) struct Curve {
+    pub(super) vehicle: usize,
+    /// Start of the next piece \[s\].
+    time_s: f64,
+    /// Metres per unit of length.
+    pub(super) scale: f64,
+    pub(super) items: Vec<Item>,
+}
+
+impl Curve {
+    /// Adds a piece of this duration \[s\] with these coefficients of the powers of time.
+    pub(super) fn push(&mut self, duration_s: f64, coefficients: Vec<Vector3<f64>>) -> Result<(), Fault> {
+        let to_s = self.time_s + duration_s;
+        // A duration that is not a number compares false.
+        if !(duration_s > 0.0 && to_s > self.time_s) {
+            let problem = format!("the duration of the piece must be positive, got {duration_s} s");
+            return refuse(ContentKind::Duration, problem, "remove the piece");
+        }
+        let piece = piece(self.vehicle, self.time_s, to_s, coefficients, self.scale);
+        self.items.push(Item::Piece(piece.ok_or_else(Fault::out_of_range)?));
+        self.time_s = to_s;
+        Ok(())
+    }
+}
+
+/// Reads the curves of these vehicles with notes; `append` adds the pieces of a file to the curve of its vehicle.
+pub(super) fn curves_of(
+    vehicles: VehicleFiles,
+    left_out: Option<String>,
+    options: &ReadOptions,
+    mut append: impl FnMut(&mut Curve, &Source) -> Result<(), ReadError>,
+) -> Result<(VehicleItems, Vec<String>), ReadError> {
+    let mut notes: Vec<String> = left_out.into_iter().collect();
+    let (several, mut has_sequence_note) = (vehicles.len() > 1, false);
+    let mut curves = VehicleItems::new();
+    if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
+        let problem = format!("{START} names the unknown vehicle {}", quoted(name));
+        return refuse(ContentKind::UnknownVehicle, problem, "use the names of the files without their extension");
+    }
+    for (name, files) in vehicles {
+        let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.metres(), items: Vec::new() };
+        for file in &files {
+            let appended = append(&mut curve, file).map_err(|fault| fault.of(&file.display_path()));
+            appended.map_err(|fault| if several { fault.among_others() } else { fault })?;
+        }
+        if files.len() > 1 && !has_sequence_note {
+            notes.push(format!("`{name}` and others fly the files of their folders in sequence"));
+            has_sequence_note = true;
+        }
+        let start = options.starts.get(&name).copied().unwrap_or_default();
+        for item in &mut curve.items {
+            if let Item::Piece(piece) = item {
+                piece.coefficients[0] += Vector3::from(start);
+            }
+        }
+        curves.push((name, curve.items));
+    }
+    Ok((curves, notes))
+}
+
+/// Returns the note on curves that start at one position, which may be relative.
+pub(super) fn note_of_starts(curves: &VehicleItems) -> Option<String> {
+    let first = |items: &[Item]| match items {
+        [Item::Piece(piece), ..] => Some(piece.coefficients[0]),
+        _ => None,
+    };
+    let is_common = curves.windows(2).any(|pair| first(&pair[0].1) == first(&pair[1].1));
+    let start = START.set("NAME=X,Y,Z");
+    is_common.then(|| format!("curves start at one position: if they are relative, set each origin with {start}"))
 }
 
 /// Parses JSON; `a_show` names the expected content and `remedy` the remedy for malformed JSON.

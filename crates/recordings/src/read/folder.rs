@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use std::str;
 
 use super::error::{ContentKind, Fault, ReadError, first_few, quoted};
-use super::head::head_of;
 use super::heading;
 use super::identity::spelling;
 use super::order::Recording;
-use super::source::{Archive, Source};
+use super::recognition::head_of;
+use super::source::{Archive, Source, VehicleFiles};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::TIME_UNIT;
 use tautline_core::track::{Clock, Item, Metadata, Tracks};
@@ -39,7 +39,7 @@ const LISTED: usize = 5;
 #[derive(Default)]
 pub(super) struct Folder {
     pub(super) files: Vec<Source>,
-    pub(super) folders: Vec<(String, Vec<Source>)>,
+    pub(super) folders: VehicleFiles,
     /// Names of files that are not tables, and of deeper folders.
     pub(super) left_out: Vec<String>,
 }
@@ -363,7 +363,7 @@ fn learn(metadata: &mut Metadata, of_part: &Metadata) {
 
 impl JoinedFile {
     /// Reads the next items if none are waiting.
-    fn fill(&mut self, vehicle: usize, is_planar: bool) -> Result<(), ReadError> {
+    fn fill(&mut self, vehicle: usize) -> Result<(), ReadError> {
         if self.until_s == f64::INFINITY || self.waiting.peek().is_some() {
             return Ok(());
         }
@@ -376,10 +376,6 @@ impl JoinedFile {
             let problem = match item {
                 Item::Sample(sample) if sample.vehicle == 0 => {
                     (sample.vehicle, sample.time_s) = (vehicle, sample.time_s + self.shift_s);
-                    if is_planar {
-                        sample.position_m.z = 0.0;
-                        sample.velocity_m_s.iter_mut().for_each(|velocity| velocity.z = 0.0);
-                    }
                     continue;
                 }
                 Item::Sample(_) => "it holds several vehicles, named by one of its columns",
@@ -404,7 +400,7 @@ impl Tracks for Joined {
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
         for (vehicle, part) in self.parts.iter_mut().enumerate() {
-            part.fill(vehicle, self.metadata.is_planar)?;
+            part.fill(vehicle)?;
         }
         // No unread item of any file is earlier than this.
         let until_s = self.parts.iter().map(|part| part.until_s).fold(f64::INFINITY, f64::min);

@@ -3,6 +3,45 @@
 use std::fmt;
 use std::ops::Deref;
 
+use super::error::ReadError;
+use super::options::ReadOptions;
+use super::order::Recording;
+use super::recognition::{Head, finds};
+use super::source::{Source, VehicleFiles};
+use super::{bezier, capture, crazyflie, csv, npz, objects, ulog};
+use crate::segments::Trajectory;
+
+/// Reader of a format.
+#[derive(Clone, Copy)]
+pub(super) enum Reader {
+    /// Reads a file.
+    File(fn(&Source, &ReadOptions) -> Result<Recording, ReadError>),
+    /// Reads curves of vehicles, with a file each.
+    Curves(OpenCurves),
+    /// Reads curves of vehicles, with a file or a folder each, whose files are flown in sequence.
+    Sequences(OpenCurves),
+    /// Feature of the reader, which this build lacks.
+    #[cfg(not(all(feature = "arrow", feature = "mcap", feature = "shows")))]
+    Missing(&'static str),
+}
+
+/// Opens curves of vehicles by their names and files. The second argument is the note on other files.
+pub(super) type OpenCurves = fn(VehicleFiles, Option<String>, &ReadOptions) -> Result<Recording, ReadError>;
+
+/// Returns a reader, or the feature of it that this build lacks.
+macro_rules! of_feature {
+    ($feature:tt, $reader:expr) => {{
+        #[cfg(feature = $feature)]
+        {
+            $reader
+        }
+        #[cfg(not(feature = $feature))]
+        {
+            Reader::Missing($feature)
+        }
+    }};
+}
+
 /// Properties of a format.
 pub struct FormatInfo {
     /// Name for `--input-format`.
@@ -18,6 +57,10 @@ pub struct FormatInfo {
     /// Options of [`FormatOption`] that this format supports.
     pub(super) supports: &'static [FormatOption],
     pub(super) packing: Packing,
+    /// Whether a file with the first bytes of the format is of this format. The first format that accepts a file reads
+    /// it.
+    pub(super) accepts: fn(&Head<'_>) -> bool,
+    pub(super) reader: Reader,
 }
 
 /// A format of recordings.
@@ -33,7 +76,13 @@ const CSV_TABLE: FormatInfo = FormatInfo {
     magic: &[],
     supports: FormatOption::TABLE,
     packing: Packing::Any,
+    // Accepts every file with the first bytes of the format.
+    accepts: |_| true,
+    reader: Reader::File(|source, options| csv::open(source, Format::CSV, options)),
 };
+
+/// Keys before the long arrays of a VVIZ show.
+const VVIZ_KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
 
 impl Format {
     /// A log of PX4.
@@ -50,6 +99,7 @@ impl Format {
             FormatOption::Axes,
             FormatOption::Unfinished,
         ],
+        reader: Reader::File(ulog::open),
         ..CSV_TABLE
     });
     /// A table in Parquet.
@@ -59,6 +109,7 @@ impl Format {
         extensions: &["parquet"],
         docs: "Table in Parquet, long or wide",
         magic: &[b"PAR1"],
+        reader: of_feature!("arrow", Reader::File(super::parquet::open)),
         ..CSV_TABLE
     });
     /// MCAP.
@@ -78,6 +129,8 @@ impl Format {
             FormatOption::Unfinished,
         ],
         packing: Packing::None,
+        reader: of_feature!("mcap", Reader::File(super::mcap::open)),
+        ..CSV_TABLE
     });
     /// `NumPy` arrays.
     pub const NPZ: Self = Self(&FormatInfo {
@@ -94,6 +147,8 @@ impl Format {
             FormatOption::Axes,
             FormatOption::OneVehicle,
         ],
+        accepts: |head| finds(head.bytes, b".npy"),
+        reader: Reader::File(npz::open),
         ..CSV_TABLE
     });
     /// Compiled Skybrush trajectories.
@@ -105,6 +160,8 @@ impl Format {
         magic: &[b"skyb"],
         supports: &[FormatOption::Axes],
         packing: Packing::Archive,
+        reader: of_feature!("shows", Reader::Curves(super::compressed::open_skyb)),
+        ..CSV_TABLE
     });
     /// A table of JSON objects.
     pub const OBJECTS: Self = Self(&FormatInfo {
@@ -112,6 +169,8 @@ impl Format {
         title: "a table of JSON objects",
         extensions: &["jsonl", "ndjson", "json"],
         docs: "Table with an object of JSON in each line, or a JSON array of objects",
+        accepts: |head| head.text.is_some_and(objects::are_in),
+        reader: Reader::File(objects::open),
         ..CSV_TABLE
     });
     /// A VVIZ show.
@@ -121,6 +180,10 @@ impl Format {
         extensions: &["vviz"],
         docs: "VVIZ show of Verge Aero or Finale 3D",
         supports: &[FormatOption::Rows],
+        accepts: |head| {
+            head.text.is_some_and(|text| text.starts_with(b"{") && VVIZ_KEYS.iter().any(|key| finds(text, key)))
+        },
+        reader: of_feature!("shows", Reader::File(super::vviz::open)),
         ..CSV_TABLE
     });
     /// A Skybrush show.
@@ -131,6 +194,8 @@ impl Format {
         docs: "Skybrush show, or its JSON",
         supports: &[FormatOption::Axes],
         packing: Packing::None,
+        accepts: |head| head.begins_with_any(Format::NPZ.magic) || head.text.is_some_and(|text| text.starts_with(b"{")),
+        reader: of_feature!("shows", Reader::File(super::skybrush::open)),
         ..CSV_TABLE
     });
     /// Compressed Crazyflie trajectories.
@@ -141,6 +206,12 @@ impl Format {
         docs: "Compressed Crazyflie trajectory, a file for each vehicle in a folder",
         supports: &[FormatOption::Axes],
         packing: Packing::Archive,
+        // A file without magic bytes: its segments must end with the last byte.
+        accepts: |head| {
+            Trajectory::decode(head.bytes, true)
+                .is_ok_and(|(found, length)| length == head.bytes.len() && !found.segments.is_empty())
+        },
+        reader: of_feature!("shows", Reader::Curves(super::compressed::open_crazyflie)),
         ..CSV_TABLE
     });
     /// A take of `OptiTrack` Motive.
@@ -149,6 +220,8 @@ impl Format {
         title: "a take of OptiTrack Motive",
         docs: "Take of OptiTrack Motive as CSV",
         supports: &[FormatOption::Rows],
+        accepts: |head| head.text.is_some_and(|text| text.starts_with(capture::MOTIVE)),
+        reader: Reader::File(capture::open_motive),
         ..CSV_TABLE
     });
     /// An export of Vicon.
@@ -157,6 +230,8 @@ impl Format {
         title: "an export of Vicon",
         docs: "Export of Vicon Nexus or Tracker as CSV",
         supports: &[FormatOption::Rows, FormatOption::Axes],
+        accepts: |head| head.text.is_some_and(capture::is_vicon),
+        reader: Reader::File(capture::open_vicon),
         ..CSV_TABLE
     });
     /// Pieces of Bezier curves.
@@ -166,6 +241,8 @@ impl Format {
         docs: "Pieces of Bezier curves, a CSV for each vehicle in a folder",
         supports: &[FormatOption::Starts, FormatOption::Axes],
         packing: Packing::Archive,
+        accepts: |head| head.text.is_some_and(bezier::has_header),
+        reader: Reader::Sequences(bezier::open),
         ..CSV_TABLE
     });
     /// Crazyflie polynomials.
@@ -175,6 +252,8 @@ impl Format {
         docs: "Crazyflie polynomials, a CSV for each vehicle in a folder",
         supports: &[FormatOption::Starts, FormatOption::Axes],
         packing: Packing::Archive,
+        accepts: |head| head.line.is_some_and(|line| line.to_ascii_lowercase().starts_with(b"duration,")),
+        reader: Reader::Sequences(crazyflie::open),
         ..CSV_TABLE
     });
     /// A table in CSV.
@@ -183,6 +262,8 @@ impl Format {
         title: "a table in CSV",
         extensions: &["csv", "txt"],
         docs: "Table in text with a header, long (`t,id,x,y,z`) or wide (`t,x1,y1,z1,x2,...`)",
+        // A text of comments only is also a table.
+        accepts: |head| head.text.is_some() && head.line.is_none_or(csv::has_separators),
         ..CSV_TABLE
     });
     /// A table of `TrajNet`.
@@ -191,6 +272,9 @@ impl Format {
         title: "a table of TrajNet",
         extensions: &["txt"],
         docs: "Numbers between blanks: frame, vehicle, x and y",
+        // `csv::open` recognises this format from all lines of a text.
+        accepts: |_| false,
+        reader: Reader::File(|source, options| csv::open(source, Format::TRAJNET, options)),
         ..CSV_TABLE
     });
     /// Numbers separated by blanks.
@@ -209,6 +293,8 @@ impl Format {
             FormatOption::OneVehicle,
             FormatOption::Incomplete,
         ],
+        accepts: |head| head.text.is_some(),
+        reader: Reader::File(|source, options| csv::open(source, Format::TEXT, options)),
         ..CSV_TABLE
     });
 

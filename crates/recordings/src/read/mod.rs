@@ -30,7 +30,6 @@ pub(crate) mod error;
 mod evidence;
 mod folder;
 mod format;
-mod head;
 mod heading;
 mod identity;
 mod layout;
@@ -43,7 +42,7 @@ mod options;
 mod order;
 #[cfg(feature = "arrow")]
 pub(crate) mod parquet;
-mod readers;
+mod recognition;
 #[cfg(feature = "shows")]
 mod show_rules;
 #[cfg(feature = "shows")]
@@ -69,8 +68,6 @@ pub use heading::is_read;
 pub use mcap::{Channels, LivePose, has_live_poses, live_poses};
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, MessageClock, ReadOptions, Scale};
 pub use order::Recording;
-#[cfg(not(feature = "mcap"))]
-pub use readers::Channels;
 #[cfg(feature = "shows")]
 pub use show_rules::{ShowPolygon, ShowRules};
 pub use time_unit::TimeUnit;
@@ -82,9 +79,10 @@ use std::path::Path;
 use crate::mcap::McapRecording;
 use error::refuse;
 use folder::{ARCHIVE, Folder};
+use format::Reader;
 #[cfg(feature = "mcap")]
 use mcap::bag;
-use readers::recognise;
+use recognition::recognise;
 use source::Source;
 use tautline_core::option::JOIN;
 use tautline_core::track::EarthOrigin;
@@ -95,7 +93,7 @@ use tautline_core::track::EarthOrigin;
 /// [`ReadError`] if the file cannot be read, has an unknown format, or its beginning is invalid.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     let opened = match folder_of(path) {
-        _ if head::is_bag(path) => open_bag(path, options),
+        _ if recognition::is_bag(path) => open_bag(path, options),
         Ok(Some(folder)) => open_folder(folder, options),
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
@@ -202,7 +200,7 @@ pub fn show_rules(path: &Path, options: &ReadOptions) -> Result<Option<ShowRules
 fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
     let data = fs::metadata(path)?;
     if data.is_dir() {
-        if head::is_bag(path) {
+        if recognition::is_bag(path) {
             let remedy = format!("open it without {JOIN}; its topics are the vehicles");
             return refuse(ContentKind::SeveralVehicles, "it is a ROS 2 bag, not a file with one vehicle", remedy);
         }
@@ -215,7 +213,7 @@ fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
         let problem = "it is a pipe or a device, but a recording is read more than once";
         return refuse(ContentKind::NotAFile, problem, "save it to a file first");
     }
-    if !readers::is_archive(path)? {
+    if !recognition::is_archive(path)? {
         return Ok(None);
     }
     let folder = Folder::of_archive(path)?;
@@ -234,19 +232,16 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
         folder.first().map(|first| recognise(first, options.format).map_err(|e| with_file(e, &first.display_path())));
     let left_out = folder.note();
     let format = format.transpose()?;
-    #[cfg(feature = "shows")]
-    if let Some(format) = format.filter(|format| compressed::is_compressed(*format) && !folder.files.is_empty()) {
-        options.refuse_unsupported_options(format)?;
-        return compressed::open_folder(format, &folder.files, left_out, options);
+    let is_sequence = format.is_some_and(|format| matches!(format.reader, Reader::Sequences(_)));
+    if !folder.folders.is_empty() && !is_sequence {
+        return Err(folder.of_folders().into());
     }
-    if let Some(format) = format.filter(|format| [Format::CRAZYFLIE, Format::BEZIER].contains(format)) {
+    if let Some(format) = format
+        && let Reader::Curves(open) | Reader::Sequences(open) = format.reader
+    {
         options.refuse_unsupported_options(format)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
-        let open = if format == Format::BEZIER { bezier::open } else { crazyflie::open };
         return open(alone.chain(folder.folders).collect(), left_out, options);
-    }
-    if !folder.folders.is_empty() {
-        return Err(folder.of_folders().into());
     }
     let options = ReadOptions { is_joined: true, ..options.clone() };
     let open = |file: Source| {
@@ -276,5 +271,20 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
     options.check()?;
     let format = recognise(&mut source, options.format)?;
     options.refuse_unsupported_options(format)?;
-    readers::open(format, &source, options)
+    recognition::open(format, &source, options)
+}
+
+/// Channels of a recording of tautline: this build reads none, because it lacks the feature `mcap`.
+#[cfg(not(feature = "mcap"))]
+pub enum Channels {}
+
+#[cfg(not(feature = "mcap"))]
+impl Channels {
+    /// Returns the channels of the next instant, one row per vehicle.
+    ///
+    /// # Errors
+    /// [`ReadError`] if the recording is damaged.
+    pub fn next(&mut self, _vehicles: usize) -> Result<Vec<tautline_core::record::Channel>, ReadError> {
+        match *self {}
+    }
 }

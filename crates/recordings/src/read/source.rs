@@ -28,6 +28,9 @@ pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// First bytes of a Zstandard file.
 pub(super) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
+/// Names of vehicles, each with its files.
+pub(super) type VehicleFiles = Vec<(String, Vec<Source>)>;
+
 /// File or archive entry that can be read repeatedly.
 #[derive(Clone, Debug)]
 pub(super) struct Source {

@@ -92,6 +92,9 @@ impl Tracks for Stated {
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
         let more = self.recording.read(items)?;
+        if self.metadata.is_planar {
+            items[before..].iter_mut().for_each(flatten);
+        }
         if !self.axes.is_identity() {
             items[before..].iter_mut().try_for_each(|item| turn(item, self.axes))?;
         }
@@ -110,6 +113,17 @@ impl Tracks for Stated {
 
     fn metadata(&self) -> &Metadata {
         &self.metadata
+    }
+}
+
+/// Removes the heights of a planar recording.
+fn flatten(item: &mut Item) {
+    match item {
+        Item::Sample(sample) => {
+            sample.position_m.z = 0.0;
+            sample.velocity_m_s.iter_mut().for_each(|velocity| velocity.z = 0.0);
+        }
+        Item::Piece(piece) => piece.coefficients.iter_mut().for_each(|coefficient| coefficient.z = 0.0),
     }
 }
 

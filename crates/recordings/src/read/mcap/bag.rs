@@ -9,9 +9,9 @@ use std::path::{Component, Path, PathBuf};
 use serde::Deserialize;
 
 use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
-use super::super::head::{BAG, BAG_INDEX, BAG_INDEX_LIMIT_BYTES, bag_index};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
+use super::super::recognition::{BAG, BAG_INDEX, BAG_INDEX_LIMIT_BYTES, bag_index};
 use super::super::source::{Source, ZSTD_MAGIC};
 use super::foreign;
 use super::split::SplitFiles;

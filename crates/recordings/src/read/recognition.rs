@@ -1,122 +1,82 @@
-//! Table of the readers, one row per format, and recognition of the format of a file by its content.
+//! Recognition of the format of a file by its first bytes, and of ROS 2 bags by their index.
 
+use std::fs::File;
+use std::io::{self, Read as _};
 use std::path::Path;
-use std::str;
 
 use super::error::{ContentKind, Fault, ReadError, refuse};
-use super::format::{Format, Packing};
-use super::head::{BAG, Head, SHOW, TABLE, head_of};
+use super::format::{Format, Packing, Reader};
+use super::objects;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::{Archive, GZIP_MAGIC, Source};
-use super::{bezier, capture, crazyflie, csv, npz, objects, ulog};
-use crate::segments::Trajectory;
 
-/// Returns the function that opens a file, or the fault of a feature that this build lacks.
-macro_rules! open_with {
-    ($feature:tt, $open:expr) => {{
-        #[cfg(feature = $feature)]
-        {
-            $open
-        }
-        #[cfg(not(feature = $feature))]
-        {
-            |_, _| Err(Fault::without_feature($feature).into())
-        }
-    }};
+/// First bytes of a file.
+pub(super) struct Head<'a> {
+    pub(super) bytes: &'a [u8],
+    /// The bytes from the first non-blank on, if the bytes contain no NUL.
+    pub(super) text: Option<&'a [u8]>,
+    /// The first line that is neither empty nor a comment.
+    pub(super) line: Option<&'a [u8]>,
 }
 
-/// Reader of a format.
-struct Reader {
-    format: Format,
-    /// Whether a file with the first bytes of the format is of this format. The first reader that accepts a file reads
-    /// it.
-    accepts: fn(&Head<'_>) -> bool,
-    open: fn(&Source, &ReadOptions) -> Result<Recording, ReadError>,
+impl<'a> Head<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+        let text = Some(text).filter(|text| memchr::memchr(0, text).is_none());
+        let lines = text.unwrap_or_default().split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
+        let line = lines.into_iter().find(|line| !line.is_empty() && !line.starts_with(b"#"));
+        Self { bytes, text, line }
+    }
+
+    pub(super) fn begins_with_any(&self, magic: &[&[u8]]) -> bool {
+        magic.iter().any(|magic| self.bytes.starts_with(magic))
+    }
 }
 
-/// Accepts every file with the first bytes of the format.
-const BY_MAGIC: fn(&Head<'_>) -> bool = |_| true;
+/// Remedies for files of other formats.
+pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip \
+                              install rosbags`), and give the folder `flight`";
+pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z, or one JSON object per line";
 
-/// All readers, in the order of recognition.
-static READERS: &[Reader] = &[
-    Reader { format: Format::ULOG, accepts: BY_MAGIC, open: ulog::open },
-    Reader { format: Format::PARQUET, accepts: BY_MAGIC, open: open_with!("arrow", super::parquet::open) },
-    Reader { format: Format::MCAP, accepts: BY_MAGIC, open: open_with!("mcap", super::mcap::open) },
-    Reader { format: Format::NPZ, accepts: |head| finds(head.bytes, b".npy"), open: npz::open },
-    Reader { format: Format::SKYB, accepts: BY_MAGIC, open: open_with!("shows", super::compressed::open_skyb) },
-    Reader { format: Format::OBJECTS, accepts: |head| head.text.is_some_and(objects::are_in), open: objects::open },
-    Reader {
-        format: Format::VVIZ,
-        accepts: |head| {
-            head.text.is_some_and(|text| text.starts_with(b"{") && VVIZ_KEYS.iter().any(|key| finds(text, key)))
-        },
-        open: open_with!("shows", super::vviz::open),
-    },
-    Reader {
-        format: Format::SKYBRUSH,
-        accepts: |head| head.begins_with_any(Format::NPZ.magic) || head.text.is_some_and(|text| text.starts_with(b"{")),
-        open: open_with!("shows", super::skybrush::open),
-    },
-    Reader {
-        format: Format::CRAZYFLIE_COMPRESSED,
-        // A file without magic bytes: its segments must end with the last byte.
-        accepts: |head| {
-            let is_whole =
-                |(found, length): (Trajectory, usize)| length == head.bytes.len() && !found.segments.is_empty();
-            Trajectory::decode(head.bytes, true).is_ok_and(is_whole)
-        },
-        open: open_with!("shows", super::compressed::open_crazyflie),
-    },
-    Reader {
-        format: Format::MOTIVE,
-        accepts: |head| head.text.is_some_and(|text| text.starts_with(capture::MOTIVE)),
-        open: capture::open_motive,
-    },
-    Reader {
-        format: Format::VICON,
-        accepts: |head| head.text.is_some_and(capture::is_vicon),
-        open: capture::open_vicon,
-    },
-    Reader {
-        format: Format::BEZIER,
-        accepts: |head| head.text.is_some_and(bezier::has_header),
-        open: |source, options| bezier::open(alone(source), None, options),
-    },
-    Reader {
-        format: Format::CRAZYFLIE,
-        accepts: |head| head.line.is_some_and(|line| line.to_ascii_lowercase().starts_with(b"duration,")),
-        open: |source, options| crazyflie::open(alone(source), None, options),
-    },
-    Reader {
-        format: Format::CSV,
-        // A text of comments only is also a table.
-        accepts: |head| head.text.is_some() && head.line.is_none_or(csv::has_separators),
-        open: |source, options| csv::open(source, Format::CSV, options),
-    },
-    Reader {
-        format: Format::TRAJNET,
-        // `csv::open` recognises this format from all lines of a text.
-        accepts: |_| false,
-        open: |source, options| csv::open(source, Format::TRAJNET, options),
-    },
-    Reader {
-        format: Format::TEXT,
-        accepts: |head| head.text.is_some(),
-        open: |source, options| csv::open(source, Format::TEXT, options),
-    },
-];
+/// Number of bytes examined.
+const HEAD_BYTES: u64 = 64 * 1024;
 
-/// Keys before the long arrays of a VVIZ show.
-const VVIZ_KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
+/// Returns the first bytes, unpacked.
+pub(super) fn head_of(source: &Source) -> Result<Vec<u8>, ReadError> {
+    let mut head = Vec::new();
+    source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    if head.is_empty() { Err(Fault::empty().into()) } else { Ok(head) }
+}
 
-fn finds(bytes: &[u8], part: &[u8]) -> bool {
+/// Name of the archive entry with a Skybrush show.
+pub(super) const SHOW: &str = "show.json";
+
+/// File name of the index of a ROS 2 bag.
+pub(super) const BAG_INDEX: &str = "metadata.yaml";
+
+/// Largest accepted index of a bag \[bytes\]: ten times the size for a thousand topics.
+pub(super) const BAG_INDEX_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
+
+/// Returns the index of a ROS 2 bag, up to the first byte above the limit.
+pub(super) fn bag_index(folder: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(folder.join(BAG_INDEX))?.take(BAG_INDEX_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Returns whether a folder is a ROS 2 bag.
+pub(super) fn is_bag(folder: &Path) -> bool {
+    let is_index = |bytes: Vec<u8>| {
+        bytes.len() as u64 <= BAG_INDEX_LIMIT_BYTES
+            && memchr::memmem::find(&bytes, b"rosbag2_bagfile_information").is_some()
+    };
+    folder.join(BAG_INDEX).is_file() && bag_index(folder).is_ok_and(is_index)
+}
+
+/// Returns whether bytes contain a part.
+pub(super) fn finds(bytes: &[u8], part: &[u8]) -> bool {
     memchr::memmem::find(bytes, part).is_some()
-}
-
-/// Returns a file as the only one of its vehicle.
-fn alone(source: &Source) -> Vec<(String, Vec<Source>)> {
-    vec![(source.stem(), vec![source.clone()])]
 }
 
 /// Recognises the format of a file, and whether it is packed by gzip.
@@ -150,8 +110,13 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
 
 /// Opens a file of this format.
 pub(super) fn open(format: Format, source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let reader = READERS.iter().find(|reader| reader.format == format).ok_or_else(Fault::unknown_format)?;
-    (reader.open)(source, options)
+    let alone = || vec![(source.stem(), vec![source.clone()])];
+    match format.reader {
+        Reader::File(open) => open(source, options),
+        Reader::Curves(open) | Reader::Sequences(open) => open(alone(), None, options),
+        #[cfg(not(all(feature = "arrow", feature = "mcap", feature = "shows")))]
+        Reader::Missing(feature) => Err(Fault::without_feature(feature).into()),
+    }
 }
 
 /// Returns whether a file is a zip archive that contains neither `NumPy` arrays nor a show.
@@ -174,8 +139,7 @@ fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
         return Err(fault);
     }
     let has_magic = |magic: &[&[u8]]| magic.is_empty() || head.begins_with_any(magic);
-    let reader = READERS.iter().find(|reader| has_magic(reader.format.magic) && (reader.accepts)(&head));
-    reader.map(|reader| reader.format).ok_or_else(Fault::unknown_format)
+    Format::all().find(|format| has_magic(format.magic) && (format.accepts)(&head)).ok_or_else(Fault::unknown_format)
 }
 
 /// Unsupported formats: first bytes, description and remedy.
@@ -258,19 +222,4 @@ fn unsupported_text(text: &[u8]) -> Option<Fault> {
         _ => return None,
     };
     Some(Fault::content(ContentKind::UnsupportedFormat, format!("it is {what}, which is not supported"), remedy))
-}
-
-/// Channels of a recording of tautline: this build reads none, because it lacks the feature `mcap`.
-#[cfg(not(feature = "mcap"))]
-pub enum Channels {}
-
-#[cfg(not(feature = "mcap"))]
-impl Channels {
-    /// Returns the channels of the next instant, one row per vehicle.
-    ///
-    /// # Errors
-    /// [`ReadError`] if the recording is damaged.
-    pub fn next(&mut self, _vehicles: usize) -> Result<Vec<tautline_core::record::Channel>, ReadError> {
-        match *self {}
-    }
 }
