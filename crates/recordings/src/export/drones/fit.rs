@@ -9,7 +9,7 @@
 //!
 //! Joints are at whole milliseconds, which every format of drones can hold.
 
-use nalgebra::Vector3;
+use nalgebra::{Cholesky, DMatrix, Dyn, MatrixXx3, Vector3};
 
 use super::motion::{Arc, Motion, is_within};
 
@@ -27,8 +27,6 @@ const GROWTH: f64 = 1.5;
 const WIDTH: f64 = 0.01;
 /// Share of the tolerance that the end of a piece may use, so that the next piece can begin within the tolerance.
 const JOINT_SHARE: f64 = 0.5;
-/// Largest number of unknown coefficients: all but the first of the first piece, and five of the second.
-const MOST_UNKNOWNS: usize = 12;
 
 /// Piece of a fitted curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -207,7 +205,9 @@ impl Fitter {
             self.motion.position_m(time_s)
         };
         let solved = squares.solve(&points, place);
-        points[given..].copy_from_slice(&solved[..POINTS - given]);
+        for (point, row) in points[given..].iter_mut().zip(solved.row_iter()) {
+            *point = row.transpose();
+        }
         Some(Piece { duration_ms: u16::try_from(duration_ms).ok()?, points })
     }
 }
@@ -249,9 +249,7 @@ struct LeastSquares {
     ratio: f64,
     /// Weights of all 8 coefficients of the first piece and of the unknowns of the second, by instant.
     rows: Vec<[f64; POINTS + 5]>,
-    unknowns: usize,
-    /// Lower triangle of the factor of Cholesky.
-    factor: [[f64; MOST_UNKNOWNS]; MOST_UNKNOWNS],
+    factor: Cholesky<f64, Dyn>,
 }
 
 impl LeastSquares {
@@ -276,57 +274,23 @@ impl LeastSquares {
             rows.push(row);
         }
         let unknowns = POINTS - given + if has_next { 5 } else { 0 };
-        let mut factor = [[0.0; MOST_UNKNOWNS]; MOST_UNKNOWNS];
-        for i in 0..unknowns {
-            for j in 0..=i {
-                factor[i][j] = rows.iter().map(|row| row[given + i] * row[given + j]).sum();
-            }
-        }
-        for j in 0..unknowns {
-            for k in 0..j {
-                for i in j..unknowns {
-                    factor[i][j] -= factor[i][k] * factor[j][k];
-                }
-            }
-            let pivot = factor[j][j].sqrt();
-            if !pivot.is_normal() {
-                return None;
-            }
-            for row in &mut factor[j..unknowns] {
-                row[j] /= pivot;
-            }
-        }
-        Some(Self { given, ratio, rows, unknowns, factor })
+        let product = |i: usize, j: usize| rows.iter().map(|row| row[given + i] * row[given + j]).sum();
+        let factor = DMatrix::from_fn(unknowns, unknowns, product).cholesky()?;
+        Some(Self { given, ratio, rows, factor })
     }
 
-    /// Returns the unknown coefficients. `place` gives the position at an instant of the first or second piece.
-    fn solve(
-        &self,
-        points: &[Vector3<f64>; POINTS],
-        place: impl Fn(usize, usize) -> Vector3<f64>,
-    ) -> [Vector3<f64>; MOST_UNKNOWNS] {
-        let mut solved = [Vector3::zeros(); MOST_UNKNOWNS];
+    /// Returns the unknown coefficients, a row each. `place` gives the position at an instant of the first or second
+    /// piece.
+    fn solve(&self, points: &[Vector3<f64>; POINTS], place: impl Fn(usize, usize) -> Vector3<f64>) -> MatrixXx3<f64> {
+        let mut solved = MatrixXx3::zeros(self.factor.l_dirty().nrows());
         for (index, row) in self.rows.iter().enumerate() {
             let fixed = points[..self.given].iter().zip(row).fold(Vector3::zeros(), |sum, (point, w)| sum + point * *w);
             let rest = place(index / INSTANTS, index % INSTANTS) - fixed;
-            for (solved, weight) in solved.iter_mut().zip(&row[self.given..]).take(self.unknowns) {
-                *solved += rest * *weight;
+            for (mut solved, weight) in solved.row_iter_mut().zip(&row[self.given..]) {
+                solved += rest.transpose() * *weight;
             }
         }
-        for i in 0..self.unknowns {
-            for k in 0..i {
-                let known = solved[k];
-                solved[i] -= known * self.factor[i][k];
-            }
-            solved[i] /= self.factor[i][i];
-        }
-        for i in (0..self.unknowns).rev() {
-            for k in i + 1..self.unknowns {
-                let known = solved[k];
-                solved[i] -= known * self.factor[k][i];
-            }
-            solved[i] /= self.factor[i][i];
-        }
+        self.factor.solve_mut(&mut solved);
         solved
     }
 }

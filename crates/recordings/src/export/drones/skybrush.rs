@@ -55,6 +55,36 @@ pub(crate) fn checksum(file: &[u8]) -> u32 {
     !hasher.finalize()
 }
 
+/// Trajectory of a drone in units of a scale, and the body of its block.
+struct Compiled {
+    scale: u32,
+    trajectory: Trajectory,
+    body: Vec<u8>,
+    vehicle: EncodedVehicle,
+}
+
+/// Compiles the trajectory of a drone. That of a show must be compiled alike by Skybrush.
+fn compiled(work: &Work<'_>, name: &str, label: &str, motion: &Motion, is_show: bool) -> Result<Compiled, DroneError> {
+    let is_allowed = if is_show { is_kept } else { |_| true };
+    let (scale, trajectory) = scaled(motion, |scale| {
+        let unit_m = unit_m(scale);
+        let encode = |pieces: &[Piece]| {
+            let found = Trajectory::of_pieces(pieces, unit_m, is_show).map_err(|error| too_far(name, error, unit_m))?;
+            let curve = found.motion(unit_m, Evaluator::Skybrush);
+            let is_alike = !is_show || proposed_scale(reach_m(&found, scale)) == scale;
+            Ok(is_alike.then_some((found, curve)))
+        };
+        work.within(name, motion, rounding_m(unit_m), is_allowed, encode)
+    })?;
+    let mut body = vec![scale_byte(scale)];
+    trajectory.encode(&mut body);
+    let (parts, bytes) = (trajectory.segments.len(), body.len());
+    check_size(name, [parts, bytes], (BLOCK, LARGEST_BODY, false))?;
+    let evaluation_m = Evaluator::Skybrush.errors_m(&trajectory, unit_m(scale));
+    let vehicle = EncodedVehicle { name: name.to_owned(), label: label.to_owned(), parts, bytes, evaluation_m };
+    Ok(Compiled { scale, trajectory, body, vehicle })
+}
+
 /// Returns the compiled trajectory of a drone.
 pub(super) fn trajectory(
     work: &Work<'_>,
@@ -62,25 +92,9 @@ pub(super) fn trajectory(
     label: &str,
     motion: &Motion,
 ) -> Result<(DroneFile, EncodedVehicle), DroneError> {
-    let (scale, found) = scaled(motion, |scale| {
-        let unit_m = unit_m(scale);
-        let encode = |pieces: &[Piece]| {
-            let found = Trajectory::of_pieces(pieces, unit_m, false).map_err(|error| too_far(name, error, unit_m))?;
-            let curve = found.motion(unit_m, Evaluator::Skybrush);
-            Ok(Some((found, curve)))
-        };
-        work.within(name, motion, rounding_m(unit_m), |_| true, encode)
-    })?;
-    let mut body = vec![scale_byte(scale)];
-    found.encode(&mut body);
-    let bytes = file(name, &found, &body, work.options.skyb_version)?;
-    let vehicle = EncodedVehicle {
-        name: name.to_owned(),
-        label: label.to_owned(),
-        parts: found.segments.len(),
-        bytes: bytes.len(),
-        evaluation_m: Evaluator::Skybrush.errors_m(&found, unit_m(scale)),
-    };
+    let Compiled { body, vehicle, .. } = compiled(work, name, label, motion, false)?;
+    let bytes = file(&body, work.options.skyb_version);
+    let vehicle = EncodedVehicle { bytes: bytes.len(), ..vehicle };
     Ok((DroneFile { name: format!("{label}.skyb"), bytes }, vehicle))
 }
 
@@ -112,8 +126,7 @@ fn scale_byte(scale: u32) -> u8 {
 }
 
 /// Returns a file with one block.
-fn file(name: &str, trajectory: &Trajectory, body: &[u8], version: u8) -> Result<Vec<u8>, DroneError> {
-    check_size(name, [trajectory.segments.len(), body.len()], (BLOCK, LARGEST_BODY, false))?;
+fn file(body: &[u8], version: u8) -> Vec<u8> {
     let length = u16::try_from(body.len()).unwrap_or(u16::MAX);
     let mut bytes = [MAGIC, &[version]].concat();
     if version == 2 {
@@ -127,31 +140,14 @@ fn file(name: &str, trajectory: &Trajectory, body: &[u8], version: u8) -> Result
         let sum = checksum(&bytes).to_le_bytes();
         bytes[CHECKSUM_AT..CHECKSUM_AT + 4].copy_from_slice(&sum);
     }
-    Ok(bytes)
+    bytes
 }
 
 /// Returns the show of all drones.
 pub(super) fn show(work: &Work<'_>, vehicles: &[Vehicle<'_>]) -> Result<Encoded, DroneError> {
     let drones = vehicles.par_iter().map(|(name, label, motion)| {
-        let (scale, found) = scaled(motion, |scale| {
-            let unit_m = unit_m(scale);
-            let encode = |pieces: &[Piece]| {
-                let found =
-                    Trajectory::of_pieces(pieces, unit_m, true).map_err(|error| too_far(name, error, unit_m))?;
-                let curve = found.motion(unit_m, Evaluator::Skybrush);
-                let is_compiled_alike = proposed_scale(reach_m(&found, scale)) == scale;
-                Ok(is_compiled_alike.then_some((found, curve)))
-            };
-            work.within(name, motion, rounding_m(unit_m), is_kept, encode)
-        })?;
-        let mut body = vec![scale_byte(scale)];
-        found.encode(&mut body);
-        let (parts, bytes) = (found.segments.len(), body.len());
-        // Skybrush compiles the drone to one block.
-        check_size(name, [parts, bytes], (BLOCK, LARGEST_BODY, false))?;
-        let evaluation_m = Evaluator::Skybrush.errors_m(&found, unit_m(scale));
-        let vehicle = EncodedVehicle { name: (*name).clone(), label: label.clone(), parts, bytes, evaluation_m };
-        Ok((drone(label, &found, scale), vehicle))
+        let Compiled { scale, trajectory, vehicle, .. } = compiled(work, name, label, motion, true)?;
+        Ok((drone(label, &trajectory, scale), vehicle))
     });
     let (drones, vehicles): (Vec<_>, Vec<_>) = first_error(drones)?.into_iter().unzip();
     let mut show = json!({
