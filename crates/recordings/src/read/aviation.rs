@@ -82,13 +82,7 @@ pub(super) fn rate_column(header: &[String]) -> Option<(usize, Option<f64>)> {
         if is_rate_in_feet_per_minute(name) {
             return Some((column, Some(FOOT_PER_MINUTE_M_S)));
         }
-        let (stem, unit) = match heading::bracketed(name) {
-            (stem, Some(unit)) => (stem, Some(unit)),
-            (stem, None) => {
-                let ending = heading::endings(stem).find(|(_, _, is_velocity)| *is_velocity);
-                ending.map_or((stem, None), |(stem, unit, _)| (stem, Some(unit)))
-            }
-        };
+        let (stem, unit) = heading::stem_and_unit(name, Some(true));
         let size = unit.and_then(|unit| heading::size_of(unit, true));
         RATES.contains(&heading::joined(stem)).then_some((column, size))
     })

@@ -4,6 +4,19 @@ use std::str::FromStr;
 
 use nalgebra::Vector3;
 
+/// Returns the axis of a direction by its first letter, 0 for east, 1 for north and 2 for up, and its sign.
+pub(super) fn direction(letter: char) -> Option<(usize, f64)> {
+    match letter {
+        'e' => Some((0, 1.0)),
+        'w' => Some((0, -1.0)),
+        'n' => Some((1, 1.0)),
+        's' => Some((1, -1.0)),
+        'u' => Some((2, 1.0)),
+        'd' => Some((2, -1.0)),
+        _ => None,
+    }
+}
+
 /// Mapping of the axes of a recording to x, y and z: a permutation with factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
@@ -49,15 +62,7 @@ impl Axes {
             }
         } else {
             for (axis, letter) in name.to_lowercase().chars().enumerate() {
-                let (to, sign) = match letter {
-                    'e' => (0, 1.0),
-                    'w' => (0, -1.0),
-                    'n' => (1, 1.0),
-                    's' => (1, -1.0),
-                    'u' => (2, 1.0),
-                    'd' => (2, -1.0),
-                    _ => return None,
-                };
+                let (to, sign) = direction(letter)?;
                 let is_first = axis < 3 && found[to].replace((axis, sign)).is_none();
                 if !is_first {
                     return None;

@@ -27,6 +27,9 @@ const BY_STEPS: &str = "because they are whole numbers with steps of that size";
 /// Limit of the whole part of a double, below the range of 64 bits.
 const TOP: f64 = 9.3e18;
 
+/// Limit below which doubles represent whole numbers exactly.
+pub(super) const EXACT: f64 = 9_007_199_254_740_992.0;
+
 /// Number of decimals of a [`Stamp::Fixed`].
 const DECIMALS: usize = 18;
 
@@ -62,8 +65,6 @@ impl Stamp {
 
     /// Returns the time as a whole number; `None` if it has a fraction.
     pub(super) fn whole(self) -> Option<i64> {
-        /// Limit below which doubles represent whole numbers exactly.
-        const EXACT: f64 = 9_007_199_254_740_992.0;
         match self {
             Self::Whole(whole) | Self::Fixed { whole, decimals: 0 } => Some(whole),
             #[expect(clippy::cast_possible_truncation, reason = "a whole number below 2^53")]

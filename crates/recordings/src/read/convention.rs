@@ -10,7 +10,7 @@
 
 use std::collections::BTreeSet;
 
-use super::axes::Axes;
+use super::axes::{self, Axes};
 use super::error::{ContentKind, Fault, quoted, refuse};
 use super::heading;
 use super::options::{ColumnNames, ReadOptions};
@@ -206,11 +206,7 @@ impl Convention {
 /// Splits a name into the part before its unit and the unit as written.
 fn without_unit(name: &str) -> (&str, &str) {
     let name = name.trim();
-    let stem = match heading::bracketed(name) {
-        (stem, Some(_)) => stem,
-        (_, None) => heading::endings(name).next().map_or(name, |(stem, ..)| stem),
-    };
-    name.split_at(stem.len())
+    name.split_at(heading::stem_and_unit(name, None).0.len())
 }
 
 /// Removes the word that names a frame; returns the rest and the axes of the frame.
@@ -245,31 +241,15 @@ struct Direction<'a> {
 
 impl<'a> Direction<'a> {
     fn of(stem: &'a str) -> Option<Self> {
-        const WORDS: [(&[&str], usize, f64); 6] = [
-            (&["east", "easting"], 0, 1.0),
-            (&["west"], 0, -1.0),
-            (&["north", "northing"], 1, 1.0),
-            (&["south"], 1, -1.0),
-            (&["up"], 2, 1.0),
-            (&["down"], 2, -1.0),
-        ];
-        const LETTERS: [(&str, usize, f64); 4] = [("e", 0, 1.0), ("n", 1, 1.0), ("u", 2, 1.0), ("d", 2, -1.0)];
+        const WORDS: [&str; 8] = ["east", "easting", "west", "north", "northing", "south", "up", "down"];
         let end = stem.rfind(SEPARATORS).map_or(0, |index| index + 1);
-        let word = stem[end..].to_lowercase();
-        let mut before = &stem[..end];
-        let by_word = WORDS.iter().find(|(words, ..)| words.contains(&&*word)).map(|&(_, axis, sign)| (axis, sign));
-        let by_letter = || LETTERS.iter().find(|(letter, ..)| *letter == word).map(|&(_, axis, sign)| (axis, sign));
-        let by_velocity = || {
-            let letter = word.strip_prefix('v')?;
-            LETTERS.iter().find(|(known, ..)| *known == letter).map(|&(_, axis, sign)| (axis, sign))
-        };
-        let (is_letter, mut is_velocity, (axis, sign)) = match by_word {
-            Some(found) => (false, false, found),
-            None => match by_letter() {
-                Some(found) => (true, false, found),
-                None => (true, true, by_velocity()?),
-            },
-        };
+        let (word, mut before) = (stem[end..].to_lowercase(), &stem[..end]);
+        let letter = word.strip_prefix('v').unwrap_or(&word);
+        let (is_letter, mut is_velocity) = (matches!(letter, "e" | "n" | "u" | "d"), letter.len() < word.len());
+        let (axis, sign) = axes::direction(letter.chars().next()?)?;
+        if !is_letter && !WORDS.contains(&&*word) {
+            return None;
+        }
         // Quantity before the direction: `vel_n`, `position_east`.
         let quantity = before.trim_end_matches(SEPARATORS);
         let start = quantity.rfind(SEPARATORS).map_or(0, |index| index + 1);

@@ -92,9 +92,12 @@ impl EarthFrame {
         if self == other { direction } else { self.axes * (other.axes.transpose() * direction) }
     }
 
-    /// Returns whether a place is the origin.
-    pub(super) fn is_at(&self, place: Geodetic) -> bool {
-        self.origin == place
+    /// Moves the frame to this origin.
+    pub(super) fn move_to(&mut self, origin: Geodetic) -> Result<(), Fault> {
+        if self.origin != origin {
+            *self = Self::at(origin)?;
+        }
+        Ok(())
     }
 
     /// Converts a place to east, north and up of the origin \[m\].

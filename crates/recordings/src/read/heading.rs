@@ -330,12 +330,7 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
         if is_part || matches!(*unit, "" | "-" | "1") {
             return Ok(name.clone());
         }
-        let own_unit = if is_time {
-            time_and_unit(name).1
-        } else {
-            let ending = || endings(name).next().map(|(_, unit, _)| unit);
-            bracketed(name).1.or_else(ending).map(str::to_owned)
-        };
+        let own_unit = if is_time { time_and_unit(name).1 } else { stem_and_unit(name, None).1.map(str::to_owned) };
         let Some(own_unit) = own_unit else { return Ok(format!("{name} [{unit}]")) };
         let is_same =
             |velocity: bool| size_of(&own_unit, velocity).is_some_and(|size| size_of(unit, velocity) == Some(size));
@@ -405,6 +400,18 @@ pub(super) fn degrees(unit: &str) -> Option<f64> {
     }
 }
 
+/// Splits a name into the part before its unit, in brackets or at its end, and the unit. The unit at the end is one of
+/// velocity if `is_velocity` is true, one of length if it is false.
+pub(super) fn stem_and_unit(name: &str, is_velocity: Option<bool>) -> (&str, Option<&str>) {
+    match bracketed(name) {
+        (stem, None) => {
+            let mut found = endings(stem).filter(|(.., velocity)| is_velocity.is_none_or(|wanted| wanted == *velocity));
+            found.next().map_or((stem, None), |(stem, unit, _)| (stem, Some(unit)))
+        }
+        known => known,
+    }
+}
+
 /// Splits a name into the part before a bracketed unit and the unit: `x [mm]`, `x (ft)`.
 pub(super) fn bracketed(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();
@@ -416,7 +423,7 @@ pub(super) fn bracketed(name: &str) -> (&str, Option<&str>) {
 }
 
 /// Returns each split of a name such as `x_mm` into stem and unit; the flag is true for units of velocity.
-pub(super) fn endings(name: &str) -> impl Iterator<Item = (&str, &str, bool)> {
+fn endings(name: &str) -> impl Iterator<Item = (&str, &str, bool)> {
     let units = VELOCITY_ENDS.map(|unit| (unit, true)).into_iter().chain(LENGTH_ENDS.map(|unit| (unit, false)));
     units.filter_map(|(unit, velocity)| {
         let (stem, end) = name.split_at_checked(name.len().checked_sub(unit.len())?)?;

@@ -491,8 +491,7 @@ impl<'a> Columns<'a> {
             let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
             columns.found.insert((String::new(), role), column);
             // An unknown unit in the name of a given column is ignored.
-            let ending = || heading::endings(name).find(|(_, _, velocity)| *velocity == is_velocity(role));
-            let unit = heading::bracketed(name).1.or_else(|| ending().map(|(_, unit, _)| unit));
+            let unit = heading::stem_and_unit(name, Some(is_velocity(role))).1;
             let unit = unit.filter(|unit| is_angle(role) || heading::size_of(unit, is_velocity(role)).is_some());
             columns.units.extend(unit.map(|unit| (column, unit)));
         }

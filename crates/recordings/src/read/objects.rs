@@ -10,7 +10,7 @@ use std::io::{BufReader, Bytes, Read};
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::cells::{Cell, Cells};
-use super::clock::Stamp;
+use super::clock::{EXACT, Stamp};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
@@ -508,9 +508,6 @@ impl<'de> Visitor<'de> for Flat<'_> {
         Ok(())
     }
 }
-
-/// Bound below which a double holds every integer exactly.
-const EXACT: f64 = 9_007_199_254_740_992.0;
 
 impl Cells for Objects {
     fn header(&self) -> &[String] {

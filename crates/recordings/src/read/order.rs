@@ -110,7 +110,6 @@ impl<R: Rows> Ordered<R> {
         let settled = || Timing::settle(&probe, options.time_unit.or(info.unit));
         let (mut timing, note) = options.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(info.epoch_ns);
-        rows.settle_clock(timing.per_second);
         metadata.notes.extend(note);
         // After a survey, notes and facts cover all rows.
         let (notes, facts) = rows.findings();
@@ -317,7 +316,7 @@ impl<R: Rows> Ordered<R> {
         }
         if items.len() == before && !self.finished {
             self.finished = true;
-            let (notes, facts) = self.rows.late_findings()?;
+            let (notes, facts) = self.rows.late_findings(self.timing.per_second)?;
             self.info.metadata.notes.extend(notes);
             self.info.metadata.facts.extend(facts);
         }
@@ -390,12 +389,10 @@ pub(super) trait Rows {
     }
 
     /// Notes and facts that are known after all rows have been read, or the fault that the rows show together.
-    fn late_findings(&self) -> Result<Findings, Fault> {
+    /// `per_second` is the number of time units per second.
+    fn late_findings(&self, _per_second: f64) -> Result<Findings, Fault> {
         Ok(Findings::default())
     }
-
-    /// Receives the number of time units per second.
-    fn settle_clock(&mut self, _per_second: f64) {}
 
     /// Returns the place in the file for the number in [`Row::place`].
     fn place(&self, number: u64) -> Place;

@@ -30,8 +30,6 @@ struct Table<C> {
     /// First time, if times are dates.
     dates: Option<Date>,
     evidence: Evidence,
-    /// Number of time units per second, once known.
-    per_second: f64,
     /// Vehicle of the last row.
     vehicle: usize,
     /// Number of rows before the current one.
@@ -77,13 +75,12 @@ pub(super) fn open<C: Cells + 'static>(
     });
     let table = Table {
         evidence: Evidence::new(&layout, options),
-        per_second: 1.0,
         cells,
         options: options.clone(),
         layout,
         names,
         local,
-        row_frame: None,
+        row_frame: local,
         dates,
         vehicle: 0,
         count: 0,
@@ -196,15 +193,12 @@ impl<C: Cells> Table<C> {
             self.evidence.compare(&self.cells, &self.layout, place, &row, self.names.all())?;
             if let Some(columns) = self.layout.convention.reference {
                 let valid = &self.layout.convention.valid;
-                if !convert_to_local(&self.cells, &mut row, (columns, valid), self.local, &mut self.row_frame)? {
+                if !convert_to_local(&self.cells, &mut row, (columns, valid), self.local.zip(self.row_frame.as_mut()))?
+                {
                     continue;
                 }
             } else if let Some(local) = &self.local {
                 row.position = local.place(row.position)?;
-            }
-            if self.layout.is_planar {
-                row.position.z = 0.0;
-                row.velocity.iter_mut().for_each(|velocity| velocity.z = 0.0);
             }
             rows.push(row);
         }
@@ -271,13 +265,9 @@ impl<C: Cells> Rows for Table<C> {
         self.names.settle();
     }
 
-    fn late_findings(&self) -> Result<Findings, Fault> {
+    fn late_findings(&self, per_second: f64) -> Result<Findings, Fault> {
         let (header, names) = (self.cells.header(), self.names.all());
-        self.evidence.findings(header, &self.layout, &self.options, names, self.per_second)
-    }
-
-    fn settle_clock(&mut self, per_second: f64) {
-        self.per_second = per_second;
+        self.evidence.findings(header, &self.layout, &self.options, names, per_second)
     }
 
     fn place(&self, number: u64) -> Place {
@@ -395,26 +385,22 @@ fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option
     Ok(None)
 }
 
-/// Converts a position with an origin in its row to the frame `local`; returns `false` if the origin is unknown or a
-/// validity column is 0. `row_frame` caches the frame of the origin.
+/// Converts a position with an origin in its row to the first of `frames`; returns `false` if the origin is unknown or a
+/// validity column is 0. The second of `frames` is that of the last origin.
 fn convert_to_local(
     cells: &impl Cells,
     row: &mut Row,
     (columns, valid): ([usize; 3], &[usize]),
-    local: Option<EarthFrame>,
-    row_frame: &mut Option<EarthFrame>,
+    frames: Option<(EarthFrame, &mut EarthFrame)>,
 ) -> Result<bool, Fault> {
     for &column in valid {
         if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
             return Ok(false);
         }
     }
-    let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
-    let row_frame = match row_frame.filter(|row_frame| row_frame.is_at(place)) {
-        Some(row_frame) => row_frame,
-        None => *row_frame.insert(EarthFrame::at(place)?),
-    };
-    row.position = local.position_from(&row_frame, row.position);
-    row.velocity = row.velocity.map(|velocity| local.direction_from(&row_frame, velocity));
+    let Some((place, (local, row_frame))) = measured_from(cells, columns)?.zip(frames) else { return Ok(false) };
+    row_frame.move_to(place)?;
+    row.position = local.position_from(row_frame, row.position);
+    row.velocity = row.velocity.map(|velocity| local.direction_from(row_frame, velocity));
     Ok(true)
 }

@@ -294,9 +294,7 @@ impl Log {
 
     /// Converts a position to the frame `local`; `fix_frame` caches the frame of the last origin.
     fn row(&self, fix: &Fix, local: &EarthFrame, fix_frame: &mut EarthFrame) -> Result<Row, Fault> {
-        if !fix_frame.is_at(fix.origin) {
-            *fix_frame = EarthFrame::at(fix.origin)?;
-        }
+        fix_frame.move_to(fix.origin)?;
         let time_us = i64::try_from(fix.time_us).ok().and_then(|time| time.checked_add(self.boot_us.unwrap_or(0)));
         let stamp = Stamp::Whole(time_us.ok_or_else(Fault::out_of_range)?);
         let position = local.position_from(fix_frame, fix.position);
