@@ -61,7 +61,7 @@ def export(
     :func:`tautline.audit`. Raises the exceptions of :func:`tautline.read`, and ``OSError`` where the file cannot be
     written.
 
-    With ``to`` as ``crazyflie``, ``skyb``, ``skyc``, ``px4-show`` or ``vviz``, writes the flight within ``tolerance``
+    With ``to`` as ``crazyflie``, ``skyb`` or ``skyc``, writes the flight within ``tolerance``
     [m] and judges the written motion. ``delta`` [m], ``ellipsoid`` (3,) [m] and ``obstacles`` replace the limits of the
     recording. ``from_s`` and ``until_s`` [s] select a part. ``compressed`` is for ``crazyflie``, ``skyb_version`` (1
     or 2) for ``skyb``. Returns an :class:`Answer`; it is not good, and no file is written, where the flight or the

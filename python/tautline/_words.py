@@ -17,7 +17,6 @@ ReadFormat = Literal[
     "npz",
     "skyb",
     "jsonl",
-    "vviz",
     "skybrush",
     "crazyflie-compressed",
     "motive",
@@ -28,5 +27,5 @@ ReadFormat = Literal[
     "trajnet",
     "text",
 ]
-ExportFormat = Literal["csv", "parquet", "npz", "mcap", "crazyflie", "skyb", "skyc", "px4-show", "vviz"]
+ExportFormat = Literal["csv", "parquet", "npz", "mcap", "crazyflie", "skyb", "skyc"]
 Reaches = Literal["places", "displacements", "distances"]

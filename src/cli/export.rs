@@ -18,15 +18,14 @@ use tautline_report::request::{
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArguments {
-    /// File to write; a folder for the formats `crazyflie`, `skyb` and `px4-show`.
+    /// File to write; a folder for the formats `crazyflie` and `skyb`.
     #[arg(long, short, value_name = "PATH")]
     out: PathBuf,
     /// Format to write [default: csv, parquet, npz or mcap, from the extension of the file]. Drones fly the others:
     /// the written motion is judged, and nothing is written if it is not clear.
     #[arg(long, value_name = "FORMAT", value_parser = written())]
     format: Option<Written>,
-    /// Sampling rate [Hz] of curves, of setpoints [default: 20] or of VVIZ [default: 30]; the motion between the
-    /// samples is lost.
+    /// Sampling rate [Hz] of curves; the motion between the samples is lost.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     sample_hz: Option<f64>,
     /// Overwrite an existing file, or a folder with files of an export.

@@ -59,8 +59,6 @@ fn every_dialect_is_judged_and_audited_again() {
         ("skyb", "sky", &[], vec!["a.skyb", "b.skyb"], "PROVED CLEAR"),
         ("skyb", "sky1", &["--skyb-version", "1"], vec!["a.skyb", "b.skyb"], "PROVED CLEAR"),
         ("skyc", "show.skyc", &[], vec![], "PROVED CLEAR"),
-        ("px4-show", "px4", &[], vec!["a.csv", "b.csv"], "CLEAR if"),
-        ("vviz", "show.vviz", &[], vec![], "CLEAR if straight between samples"),
     ] {
         let arguments = ["export", "flight.csv", "--format", to, "-o", output, "--delta", "1.5"];
         let done = ran(folder.path(), &[&arguments[..], more].concat());
@@ -69,8 +67,7 @@ fn every_dialect_is_judged_and_audited_again() {
         assert!(text.contains(verdict), "{to}: {text}");
         // 2 m between the centres, less the deviations.
         let (margin, deviation) = (number(&text, "margin"), number(&text, "at most"));
-        let most = if to == "px4-show" { 0.05 } else { 0.01 };
-        assert!(deviation > 0.0 && deviation <= most, "{to}: {text}");
+        assert!(deviation > 0.0 && deviation <= 0.01, "{to}: {text}");
         assert!(margin <= 0.5 + 1e-6 && margin >= 0.5 - 2.0 * deviation - 0.01, "{to}: {text}");
         if !files.is_empty() {
             assert_eq!(names(&folder.path().join(output)), files, "{to}");
@@ -160,9 +157,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
         ("flight.csv", "skyb", &["--tolerance", "-1"], "export/tolerance", ["--tolerance", "-1"]),
         ("flight.csv", "skyb", &["--skyb-version", "3"], "export/skyb-version", ["must be 1 or 2", "3"]),
         ("flight.csv", "skyc", &["--compressed"], "export/unused-option", ["--compressed", "crazyflie"]),
-        ("flight.csv", "skyc", &["--sample-hz", "10"], "export/unused-option", ["--sample-hz", "px4-show"]),
-        ("flight.csv", "vviz", &["--sample-hz", "0"], "export/sample-rate", ["--sample-hz", "0.0"]),
-        ("flight.csv", "px4-show", &["--tolerance", "0.001"], "export/too-fast", ["samples are up to", "--sample-hz"]),
+        ("flight.csv", "skyc", &["--sample-hz", "10"], "export/unused-option", ["--sample-hz", "--format csv"]),
         ("flight.csv", "skyb", &["--from", "20"], "export/window", ["--from: no vehicle", "0.0 s to 8.0 s"]),
         ("flight.csv", "skyb", &["--until", "-2"], "export/window", ["--until: no vehicle", "0.0 s to 8.0 s"]),
         ("flight.csv", "skyb", &["--until", "nan"], "export/window", ["--until: must be a finite", "got NaN"]),
@@ -185,7 +180,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
         ("point.csv", "skyb", &[], "export/absent", ["vehicle b", "absent for a part"]),
         ("distant.csv", "crazyflie", &[], "export/tolerance", ["rounds positions", "origin"]),
     ] {
-        let output = if to == "skyc" || to == "vviz" { "show" } else { "out" };
+        let output = if to == "skyc" { "show" } else { "out" };
         let arguments = [&["export", input, "--format", to, "-o", output, "--delta", "0.5"], more].concat();
         let refused = ran(folder.path(), &arguments);
         assert_eq!((refused.exit, refused.code()), (Some(2), code), "{arguments:?}: {}", said(&refused));
@@ -200,7 +195,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
     assert_eq!(names(folder.path()), before);
     let unknown = ran(folder.path(), &["export", "flight.csv", "--format", "foo", "-o", "out"]);
     assert_eq!(unknown.exit, Some(2));
-    assert!(said(&unknown).contains("crazyflie, skyb, skyc, px4-show, vviz"), "{}", said(&unknown));
+    assert!(said(&unknown).contains("crazyflie, skyb, skyc"), "{}", said(&unknown));
     let kept = ["export", "flight.csv", "--format", "skyb", "-o", "full", "--delta", "1", "--force"];
     assert_eq!(ran(folder.path(), &kept).code(), "files/exists");
     assert_eq!(fs::read_to_string(folder.path().join("full/notes.md")).expect("read"), "mine");

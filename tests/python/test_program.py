@@ -204,7 +204,7 @@ class Recordings(Case):
         self.assertIn("VIOLATION", refused.refusal)
         self.assertFalse((self.folder / "no.skyc").exists())
         unknown = lambda: tl.export(self.folder / "pair.npz", self.folder / "no", to="foo")  # noqa: E731
-        self.refuses(tl.Error, "px4-show", unknown)
+        self.refuses(tl.Error, "skyc", unknown)
 
     def test_a_rate_interpolates_except_across_gaps(self) -> None:
         file = self.folder / "a.csv"

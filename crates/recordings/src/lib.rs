@@ -13,7 +13,7 @@
 //! | --- | --- |
 //! | `arrow` | reader and exporter of Parquet |
 //! | `mcap` | module [`mcap`], reader and exporter of MCAP, ROS 2 bags |
-//! | `shows` | readers of Skybrush and VVIZ shows and of compressed trajectories |
+//! | `shows` | readers of Skybrush shows and of compressed trajectories |
 //!
 //! A build without a feature refuses its files with an error that names the feature.
 

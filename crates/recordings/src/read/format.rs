@@ -81,9 +81,6 @@ const CSV_TABLE: FormatInfo = FormatInfo {
     reader: Reader::File(|source, options| csv::open(source, Format::CSV, options)),
 };
 
-/// Keys before the long arrays of a VVIZ show.
-const VVIZ_KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
-
 impl Format {
     /// A log of PX4.
     pub const ULOG: Self = Self(&FormatInfo {
@@ -171,19 +168,6 @@ impl Format {
         docs: "Table with an object of JSON in each line, or a JSON array of objects",
         accepts: |head| head.text.is_some_and(objects::are_in),
         reader: Reader::File(objects::open),
-        ..CSV_TABLE
-    });
-    /// A VVIZ show.
-    pub const VVIZ: Self = Self(&FormatInfo {
-        name: "vviz",
-        title: "a VVIZ show",
-        extensions: &["vviz"],
-        docs: "VVIZ show of Verge Aero or Finale 3D",
-        supports: &[FormatOption::Rows],
-        accepts: |head| {
-            head.text.is_some_and(|text| text.starts_with(b"{") && VVIZ_KEYS.iter().any(|key| finds(text, key)))
-        },
-        reader: of_feature!("shows", Reader::File(super::vviz::open)),
         ..CSV_TABLE
     });
     /// A Skybrush show.
@@ -306,7 +290,6 @@ impl Format {
         Self::NPZ,
         Self::SKYB,
         Self::OBJECTS,
-        Self::VVIZ,
         Self::SKYBRUSH,
         Self::CRAZYFLIE_COMPRESSED,
         Self::MOTIVE,

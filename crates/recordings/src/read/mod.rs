@@ -54,8 +54,6 @@ mod stated;
 mod table;
 mod time_unit;
 mod ulog;
-#[cfg(feature = "shows")]
-mod vviz;
 
 #[cfg(feature = "arrow")]
 pub use self::parquet::is_guarded;

@@ -1,4 +1,4 @@
-//! VVIZ shows, and motion capture exports in the formats that their vendors document.
+//! Motion capture exports in the formats that their vendors document.
 
 use tautline_recordings::read::{ReadError, ReadOptions};
 
@@ -20,77 +20,6 @@ fn refused(valid: &str, changes: &[(&str, &str, &str, &str)]) {
         assert!(valid.contains(from), "there is no {from}");
         assert_refused(&read(&valid.replacen(from, to, 1)).expect_err(to), code, place);
     }
-}
-
-const VVIZ: &str = concat!(
-    r#"{"version": "1.0", "performanceName": "test", "coordinateFrame": "ogl","#,
-    "\n",
-    r#""defaultPositionRate": 2.0, "defaultColorRate": 10.0, "timeOffsetSecs": 100.0, "performances": ["#,
-    "\n",
-    r#"{"id": 0, "agentDescription": {"homeX": -7.5, "homeY": 0.5, "homeZ": 3.0, "homeH": 0.0, "agentTraversal": ["#,
-    "\n",
-    r#"{"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 10, "dz": 0, "dh": 3}, {"dx": 1, "dy": 0, "dz": 2}]},"#,
-    "\n",
-    r#""payloadDescription": [{"id": 0, "type": "Light", "payloadActions": [{"r": 1, "g": 2, "#,
-    r#""b": 3, "frames": 4}]}]},"#,
-    "\n",
-    r#"{"id": "B", "agentDescription": {"homeX": 1, "homeY": 0, "homeZ": 0, "agentTraversal": ["#,
-    "\n",
-    r#"{"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}]}, "payloadDescription": []}]}"#,
-);
-
-#[test]
-fn vviz_drones_start_at_home_and_sum_displacements() {
-    let found = whole(VVIZ);
-    assert_eq!(found.vehicles, ["0", "B"]);
-    assert_eq!(
-        found.samples(),
-        [
-            (100.0, "0", [-7.5, 3.0, 0.5]),
-            (100.0, "B", [1.0, 0.0, 0.0]),
-            (100.5, "B", [1.0, 0.0, 1.0]),
-            (101.5, "0", [-7.5, 3.0, 10.5]),
-            (102.0, "0", [-6.5, 5.0, 10.5]),
-        ]
-    );
-    assert!(found.notes.iter().any(|note| note.contains("z up")), "{:?}", found.notes);
-}
-
-#[test]
-fn vviz_drone_without_samples_is_noted() {
-    let still = VVIZ.replace(r#"{"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}"#, "");
-    let found = whole(&still);
-    assert_eq!(found.samples().len(), 3);
-    assert!(
-        found.notes.iter().any(|note| note.starts_with("not judged") && note.ends_with("`B`")),
-        "{:?}",
-        found.notes
-    );
-}
-
-#[test]
-fn invalid_vviz_shows_are_refused() {
-    refused(
-        VVIZ,
-        &[
-            ("\"ogl\"", "\"ned\"", "recording/unusable-frame", ""),
-            ("\"id\": \"B\"", "\"id\": 0", "recording/vehicle-twice", "drone `0`"),
-            ("\"dt\": 1.5", "\"dt\": 0", "recording/duration", "drone `0`, sample 2"),
-            ("\"dt\": 1.5", "\"dt\": -1", "recording/duration", "drone `0`, sample 2"),
-            ("\"dx\": 1,", "\"dx\": 1e308, \"dx\": 2,", "recording/malformed", "line 4"),
-            ("\"dx\": 1,", "\"dx\": null,", "recording/malformed", "line 4"),
-            ("\"dx\": 1,", "", "recording/malformed", "line 4"),
-            ("-7.5", "1e309", "recording/malformed", "line 3"),
-            (
-                "\"defaultPositionRate\": 2.0",
-                "\"defaultPositionRate\": 0",
-                "recording/frame-rate",
-                "drone `0`, sample 3",
-            ),
-            ("\"performances\"", "\"drones\"", "recording/malformed", "line 7"),
-        ],
-    );
-    assert_refused(&read(&VVIZ[..VVIZ.len() / 2]).expect_err("cut"), "recording/truncated", "line 4");
 }
 
 fn mm(length: f64) -> f64 {

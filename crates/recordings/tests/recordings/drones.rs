@@ -7,7 +7,7 @@ use nalgebra::{Vector3, vector};
 use tautline_core::track::Item;
 use tautline_recordings::export::drones::motion::{Arc, Motion};
 use tautline_recordings::export::drones::{self, Dialect, DroneOptions, deviation_with_rests};
-use tautline_recordings::read::{self, ReadOptions, TimeUnit};
+use tautline_recordings::read::{self, ReadOptions};
 use tempfile::TempDir;
 
 use crate::recording::{Whole, assert_refused};
@@ -44,12 +44,9 @@ fn written(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-fn motions(path: &Path, holds: bool) -> Vec<(String, Motion)> {
-    let time_unit = path.is_dir().then_some(TimeUnit::Seconds);
-    let options = ReadOptions { time_unit, ..ReadOptions::default() };
-    let recording = read::open(path, &options).or_else(|_| read::open(path, &ReadOptions::default()));
-    let mut recording = recording.unwrap_or_else(|error| panic!("{error}"));
-    let flown = drones::motions(recording.as_mut(), holds).expect("read");
+fn motions(path: &Path) -> Vec<(String, Motion)> {
+    let mut recording = read::open(path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let flown = drones::motions(recording.as_mut()).expect("read");
     flown.into_iter().map(|of| (of.name, of.motion)).collect()
 }
 
@@ -57,7 +54,7 @@ fn motions(path: &Path, holds: bool) -> Vec<(String, Motion)> {
 fn compiled_trajectories_are_read_as_specified() {
     for bytes in [v1(), v2()] {
         let (_folder, path) = written("drone7.skyb", &bytes);
-        let found = motions(&path, false);
+        let found = motions(&path);
         assert_eq!((found.len(), &*found[0].0, found[0].1.span_s()), (1, "drone7", Some((0.0, 3.0))));
         let at = |time_s: f64| found[0].1.position_m(time_s);
         // The cubic 0, 0, 3, 3 has its middle at 1.5, here in y.
@@ -115,7 +112,7 @@ fn a_trajectory_without_segments_is_a_drone_that_stands() {
 fn compressed_crazyflie_trajectories_are_recognised_by_their_end() {
     let bytes = [&[0, 0, 0, 0, 0xe8, 0x03, 0, 0][..], &[1, 0xf4, 0x01, 0x88, 0x13], &[0; 3]].concat();
     let (_folder, path) = written("cf4", &bytes);
-    let found = motions(&path, false);
+    let found = motions(&path);
     assert_eq!((&*found[0].0, found[0].1.span_s()), ("cf4", Some((0.0, 0.5))));
     assert_eq!(found[0].1.position_m(0.25), vector![2.5, 0.0, 1.0]);
     for other in [&bytes[..bytes.len() - 1], &[&bytes[..], &[0]].concat(), &[0; 11]] {
@@ -161,8 +158,7 @@ fn exported_with(options: &DroneOptions) -> (TempDir, PathBuf, drones::Encoded) 
 #[test]
 fn every_dialect_reads_back_within_its_tolerance() {
     for dialect in Dialect::ALL {
-        let held_m = if dialect == Dialect::Px4Show { 0.07 } else { 0.01 };
-        let usual = DroneOptions { tolerance_m: Some(held_m), ..DroneOptions::new(dialect) };
+        let usual = DroneOptions::new(dialect);
         let mut forms = vec![usual];
         match dialect {
             Dialect::Crazyflie => forms.push(DroneOptions { is_compressed: true, ..usual }),
@@ -171,11 +167,14 @@ fn every_dialect_reads_back_within_its_tolerance() {
         }
         for options in forms {
             let (_folder, path) = exported(&options);
-            let found = motions(&path, dialect.holds_samples());
+            let found = motions(&path);
             assert_eq!(found.iter().map(|of| &*of.0).collect::<Vec<_>>(), ["3", "12"], "{dialect:?}");
             for ((_, flown), (_, found)) in flight().iter().zip(&found) {
                 let deviation = deviation_with_rests(flown, found);
-                assert!(deviation.bound_m <= held_m && deviation.bound_m > 0.0, "{options:?}: {deviation:?}");
+                assert!(
+                    deviation.bound_m <= usual.tolerance_m && deviation.bound_m > 0.0,
+                    "{options:?}: {deviation:?}"
+                );
             }
             let again = exported(&options);
             assert_eq!(bytes_of(&path), bytes_of(&again.1), "{options:?} is not deterministic");
@@ -244,7 +243,7 @@ fn decoders_in_single_precision_agree_with_the_reader() {
         let unit_m = f32::from(file[13]) / 1000.0;
         let segments = fs::read(traj.join(format!("{name}.traj"))).expect("read");
         let rows = fs::read_to_string(plain.join(format!("{name}.csv"))).expect("read");
-        let found = [&skyb, &traj, &plain].map(|path| motions(path, false)[index].1.clone());
+        let found = [&skyb, &traj, &plain].map(|path| motions(path)[index].1.clone());
         for k in 0..=65_u16 {
             let time_s = f32::from(k) / 10.0;
             let truth = flight()[index].1.position_m(f64::from(time_s));
@@ -311,7 +310,7 @@ fn a_folder_of_compiled_trajectories_is_one_recording() {
     for (name, bytes) in [("d10.skyb", &v1()[..]), ("d9.skyb", &v2()), ("d2.skyb", stands), ("show.md", b"notes")] {
         fs::write(folder.path().join(name), bytes).expect("written");
     }
-    let found = motions(folder.path(), false);
+    let found = motions(folder.path());
     assert_eq!(found.iter().map(|of| &*of.0).collect::<Vec<_>>(), ["d2", "d9", "d10"]);
     assert!(found.iter().all(|(_, motion)| motion.span_s() == Some((0.0, 3.0))), "{found:?}");
     fs::write(folder.path().join("d11.skyb"), b"skyb\x01").expect("written");
@@ -322,17 +321,17 @@ fn a_folder_of_compiled_trajectories_is_one_recording() {
 /// The firmware evaluates polynomials by the scheme of Horner in single precision.
 #[test]
 fn deviation_covers_single_precision_in_the_drone() {
-    let options = DroneOptions { tolerance_m: Some(0.1), ..DroneOptions::new(Dialect::Crazyflie) };
+    let options = DroneOptions { tolerance_m: 0.1, ..DroneOptions::new(Dialect::Crazyflie) };
     let x_m = |k: u32| 3e4 + f64::from(k % 4);
     let arc = |k: u32| {
         Arc::straight(f64::from(k), f64::from(k + 1), vector![x_m(k), 0.0, 0.0], vector![x_m(k + 1), 0.0, 0.0])
     };
     let flight = [("a".to_owned(), Motion { arcs: (0..4).map(arc).collect() })];
-    let encoded = drones::encode(&flight, &DroneOptions { tolerance_m: Some(0.5), ..options }, &|| false);
+    let encoded = drones::encode(&flight, &DroneOptions { tolerance_m: 0.5, ..options }, &|| false);
     let encoded = encoded.expect("encoded");
     let file = &encoded.files[0];
     let (_folder, path) = written("a.csv", &file.bytes);
-    let mut held = motions(&path, false).remove(0).1;
+    let mut held = motions(&path).remove(0).1;
     let exact = deviation_with_rests(&flight[0].1, &held);
     let added_m = encoded.vehicles[0].add_evaluation(&mut held);
     let whole = deviation_with_rests(&flight[0].1, &held);

@@ -42,12 +42,6 @@ const BEZIER: &str = "#duration,p0x,p0y,p0z,...\n1,0,0,1,1,2,1,\n0.5,1,2,1,1,2,1
 const SHOW: &str = r#"{"version": 1, "swarm": {"drones": [{"settings": {"name": "A", "trajectory": {"version": 1,
     "takeoffTime": 2, "points": [[0, [1, 2, 0], []], [4, [1, 2, 8], [[0, 0, 0]]]]}}},
     {"settings": {"trajectory": {"$ref": "./a.json#"}}}]}}"#;
-const VVIZ: &str = concat!(
-    r#"{"defaultPositionRate": 2, "timeOffsetSecs": 1, "performances": [{"id": 0, "agentDescription": "#,
-    r#"{"homeX": 1, "homeY": 2, "homeZ": 3, "agentTraversal": [{"dx": 0, "dy": 0, "dz": 0}, "#,
-    r#"{"dt": 1.5, "dx": 0, "dy": 1, "#,
-    r#""dz": 0}, {"dx": 1, "dy": 0, "dz": 2}]}}]}"#,
-);
 const MOTIVE: &str = concat!(
     "Format Version,1.23,Length Units,Meters,Coordinate Space,Global\n",
     "\n",
@@ -143,7 +137,6 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("split", SPLIT.into()),
         ("dates", DATES.into()),
         ("ulog", log.bytes()),
-        ("vviz", VVIZ.into()),
         ("skyb", b"skyb\x01\x01\x10\x00\x02\0\0\0\0\0\0\0\0\x11\x60\xea\x88\x13\xa8\x61".into()),
         ("traj", b"\0\0\0\0\xe8\x03\0\0\x01\xf4\x01\x88\x13\0\0\0".into()),
         ("motive", MOTIVE.into()),

@@ -274,7 +274,7 @@ mod tests {
         let arc = |k: u32| Arc::straight(f64::from(k) / 20.0, f64::from(k + 1) / 20.0, place(k), place(k + 1));
         let motion = Motion { arcs: (0..1200).map(arc).collect() };
         let flight = [("cf1".to_owned(), motion)];
-        let options = DroneOptions { tolerance_m: Some(0.03), ..DroneOptions::new(Dialect::Crazyflie) };
+        let options = DroneOptions { tolerance_m: 0.03, ..DroneOptions::new(Dialect::Crazyflie) };
         let refused = encode(&flight, &options, &|| false).expect_err("refused");
         assert!(matches!(refused, DroneError::TooLong { pieces: 32.., most: 4096, compresses: true, .. }), "{refused}");
         assert!(refused.help().contains("from_s and until_s, or compressed"));
@@ -293,7 +293,7 @@ mod tests {
         let refused = encode(&flight, &options, &|| false).expect_err("refused");
         assert!(matches!(refused, DroneError::TooFar { largest_m: 32.767, .. }), "{refused}");
         assert!(encode(&flight, &DroneOptions::new(Dialect::Crazyflie), &|| false).is_ok());
-        let fine = DroneOptions { tolerance_m: Some(0.001), ..options };
+        let fine = DroneOptions { tolerance_m: 0.001, ..options };
         assert!(matches!(encode(&flight, &fine, &|| false), Err(DroneError::Resolution { .. })));
     }
 

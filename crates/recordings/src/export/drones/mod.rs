@@ -1,7 +1,7 @@
-//! Exports to formats that drones fly: Crazyflie trajectories, Skybrush shows and tables of setpoints.
+//! Exports to formats that drones fly: Crazyflie trajectories and Skybrush shows.
 //!
-//! These formats hold less than a recording. A flight is fitted by polynomials ([`fit`]) or sampled, rounded to the
-//! numbers of the format, and encoded. The encoded curves are decoded again and compared with the flight: the largest
+//! These formats hold less than a recording. A flight is fitted by polynomials ([`fit`]), rounded to the numbers of the
+//! format, and encoded. The encoded curves are decoded again and compared with the flight: the largest
 //! distance at any instant is proved ([`motion::deviation`]), not sampled.
 //!
 //! [`encode`] returns files in memory. A caller that writes them reads the files back and judges what the files hold.
@@ -10,7 +10,6 @@ mod crazyflie;
 mod evaluation;
 pub mod fit;
 pub mod motion;
-mod sampled;
 pub(crate) mod skybrush;
 
 use std::fs::File;
@@ -24,7 +23,7 @@ use self::motion::{Arc, Deviation, Motion, deviation};
 use crate::read::error::ReadError;
 use crate::segments::Trajectory;
 use tautline_core::failure::Failure;
-use tautline_core::option::{COMPRESSED, FROM, SAMPLE_HZ, SKYB_VERSION, TOLERANCE, UNTIL};
+use tautline_core::option::{COMPRESSED, FROM, SKYB_VERSION, TOLERANCE, UNTIL};
 use tautline_core::track::{Item, Sample, Tracks};
 
 /// Format that drones fly.
@@ -36,15 +35,11 @@ pub enum Dialect {
     Skyb,
     /// Skybrush show.
     Skyc,
-    /// Folder with a CSV of setpoints for each PX4 drone, as MAVSDK Drone Show reads them.
-    Px4Show,
-    /// VVIZ show.
-    Vviz,
 }
 
 impl Dialect {
     /// All dialects.
-    pub const ALL: [Self; 5] = [Self::Crazyflie, Self::Skyb, Self::Skyc, Self::Px4Show, Self::Vviz];
+    pub const ALL: [Self; 3] = [Self::Crazyflie, Self::Skyb, Self::Skyc];
 
     /// Returns the name for `--format`.
     #[must_use]
@@ -53,8 +48,6 @@ impl Dialect {
             Self::Crazyflie => "crazyflie",
             Self::Skyb => "skyb",
             Self::Skyc => "skyc",
-            Self::Px4Show => "px4-show",
-            Self::Vviz => "vviz",
         }
     }
 
@@ -65,33 +58,13 @@ impl Dialect {
             Self::Crazyflie => "Crazyflie trajectories",
             Self::Skyb => "Skybrush trajectories",
             Self::Skyc => "a Skybrush show",
-            Self::Px4Show => "setpoints for MAVSDK Drone Show",
-            Self::Vviz => "a VVIZ show",
         }
     }
 
     /// Returns whether the output is a folder with a file for each vehicle.
     #[must_use]
     pub fn is_folder(self) -> bool {
-        matches!(self, Self::Crazyflie | Self::Skyb | Self::Px4Show)
-    }
-
-    /// Returns whether vehicles are sampled, not fitted by polynomials.
-    #[must_use]
-    pub fn is_sampled(self) -> bool {
-        matches!(self, Self::Px4Show | Self::Vviz)
-    }
-
-    /// Returns whether a vehicle rests at each sample until the next one.
-    #[must_use]
-    pub fn holds_samples(self) -> bool {
-        self == Self::Px4Show
-    }
-
-    /// Returns the default sampling rate \[Hz\]: that of MAVSDK Drone Show, and a common rate of pictures.
-    #[must_use]
-    pub fn usual_hz(self) -> f64 {
-        if self == Self::Px4Show { 20.0 } else { 30.0 }
+        matches!(self, Self::Crazyflie | Self::Skyb)
     }
 }
 
@@ -100,14 +73,12 @@ impl Dialect {
 pub struct DroneOptions {
     /// Format.
     pub dialect: Dialect,
-    /// Largest distance of a curve from the flight \[m\]. `None` accepts every distance of samples.
-    pub tolerance_m: Option<f64>,
+    /// Largest distance of a curve from the flight \[m\].
+    pub tolerance_m: f64,
     /// Whether Crazyflie trajectories are compressed.
     pub is_compressed: bool,
     /// Version of `.skyb` files: 1, or 2 with a checksum.
     pub skyb_version: u8,
-    /// Sampling rate \[Hz\]; `None` for that of the format.
-    pub sample_hz: Option<f64>,
     /// Safety distance \[m\] that a show states.
     pub delta_m: Option<f64>,
 }
@@ -119,12 +90,7 @@ impl DroneOptions {
     /// Returns the options of a format with their defaults.
     #[must_use]
     pub fn new(dialect: Dialect) -> Self {
-        let tolerance_m = (!dialect.is_sampled()).then_some(Self::TOLERANCE_M);
-        Self { dialect, tolerance_m, is_compressed: false, skyb_version: 2, sample_hz: None, delta_m: None }
-    }
-
-    fn tolerance(&self) -> f64 {
-        self.tolerance_m.unwrap_or(Self::TOLERANCE_M)
+        Self { dialect, tolerance_m: Self::TOLERANCE_M, is_compressed: false, skyb_version: 2, delta_m: None }
     }
 }
 
@@ -153,17 +119,17 @@ pub struct EncodedVehicle {
     pub name: String,
     /// Name in the output.
     pub label: String,
-    /// Number of polynomials or samples.
+    /// Number of polynomials.
     pub parts: usize,
     /// Size of its motion in the memory of a drone, or in the file \[bytes\].
     pub bytes: usize,
-    /// Bound on the error of each polynomial that a drone computes in single precision \[m\]; empty for samples.
+    /// Bound on the error of each polynomial that a drone computes in single precision \[m\].
     pub evaluation_m: Vec<f64>,
 }
 
 impl EncodedVehicle {
     /// Adds the error of single precision to the arcs of the motion that its file holds. Returns the largest error
-    /// \[m\]; 0 for samples.
+    /// \[m\].
     pub fn add_evaluation(&self, motion: &mut Motion) -> f64 {
         let largest_m = self.evaluation_m.iter().copied().fold(0.0, f64::max);
         let is_each = self.evaluation_m.len() == motion.arcs.len();
@@ -185,12 +151,12 @@ pub struct FlownVehicle {
     pub radius_m: Option<f64>,
 }
 
-/// Reads all motions of a recording. Samples are joined by straight lines. With `holds`, a vehicle rests at each sample
-/// until the next one. Gaps are joined too, so the caller must refuse gaps before.
+/// Reads all motions of a recording. Samples are joined by straight lines. Gaps are joined too, so the caller must
+/// refuse gaps before.
 ///
 /// # Errors
 /// [`ReadError`] if the recording cannot be read.
-pub fn motions(recording: &mut dyn Tracks<Error = ReadError>, holds: bool) -> Result<Vec<FlownVehicle>, ReadError> {
+pub fn motions(recording: &mut dyn Tracks<Error = ReadError>) -> Result<Vec<FlownVehicle>, ReadError> {
     let (mut items, mut flown, mut last) = (Vec::new(), Vec::<FlownVehicle>::new(), Vec::<Option<Sample>>::new());
     while recording.read(&mut items)? {
         for item in items.drain(..) {
@@ -204,9 +170,7 @@ pub fn motions(recording: &mut dyn Tracks<Error = ReadError>, holds: bool) -> Re
                 Item::Sample(sample) => {
                     *radius_m = sample.radius_m;
                     if let Some(before) = last[vehicle].replace(sample) {
-                        let (from_s, from) = (before.time_s, before.position_m);
-                        let to = if holds { from } else { sample.position_m };
-                        arcs.push(Arc::straight(from_s, sample.time_s, from, to));
+                        arcs.push(Arc::straight(before.time_s, sample.time_s, before.position_m, sample.position_m));
                     }
                 }
                 Item::Piece(piece) => {
@@ -235,7 +199,7 @@ pub fn encode(
     options: &DroneOptions,
     is_interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<Encoded, DroneError> {
-    let tolerance_m = options.tolerance();
+    let tolerance_m = options.tolerance_m;
     if !(tolerance_m > 0.0 && tolerance_m.is_finite()) {
         return Err(DroneError::Tolerance(tolerance_m));
     }
@@ -251,12 +215,10 @@ pub fn encode(
     let vehicles: Vec<_> = flight.iter().zip(labels).map(|((name, motion), label)| (name, label, motion)).collect();
     match options.dialect {
         Dialect::Skyc => skybrush::show(&work, &vehicles),
-        Dialect::Vviz => sampled::vviz(&work, &vehicles),
         _ => {
             let encoded = vehicles.par_iter().map(|(name, label, motion)| match options.dialect {
                 Dialect::Crazyflie if options.is_compressed => crazyflie::compressed(&work, name, label, motion),
                 Dialect::Crazyflie => crazyflie::polynomials(&work, name, label, motion),
-                Dialect::Px4Show => sampled::px4_show(&work, name, label, motion),
                 _ => skybrush::trajectory(&work, name, label, motion),
             });
             let (files, vehicles) = first_error(encoded)?.into_iter().unzip();
@@ -273,7 +235,7 @@ pub fn is_exported(path: &Path) -> io::Result<bool> {
     let mut bytes = Vec::new();
     File::open(path)?.take(crazyflie::MEMORY_BYTES as u64 + 1).read_to_end(&mut bytes)?;
     Ok(match path.extension().and_then(|extension| extension.to_str()) {
-        Some("csv") => bytes.starts_with(b"duration,x^0") || bytes.starts_with(b"idx,t,px"),
+        Some("csv") => bytes.starts_with(b"duration,x^0"),
         Some("skyb") => bytes.starts_with(skybrush::MAGIC),
         Some("traj") => Trajectory::decode(&bytes, true).is_ok_and(|(_, length)| length == bytes.len()),
         _ => false,
@@ -319,7 +281,7 @@ impl Work<'_> {
         is_allowed: fn(u64) -> bool,
         encode: impl Fn(&[Piece]) -> Result<Option<(T, Motion)>, DroneError>,
     ) -> Result<T, DroneError> {
-        let tolerance_m = self.options.tolerance();
+        let tolerance_m = self.options.tolerance_m;
         let mut aim_m = tolerance_m * (1.0 - BOUND_SHARE) - reserve_m;
         if aim_m <= 0.0 {
             return Err(DroneError::Resolution { tolerance_m, rounding_m: reserve_m });
@@ -409,9 +371,6 @@ pub enum DroneError {
     /// The version of `.skyb` is unknown.
     #[error("{SKYB_VERSION}: must be 1 or 2, got {0}")]
     SkybVersion(u8),
-    /// The sampling rate is out of range.
-    #[error("{SAMPLE_HZ}: must be a positive rate that gives at most 10 million samples of a vehicle, got {0:?}")]
-    SampleRate(f64),
     /// A vehicle moves too fast for the tolerance.
     #[error("vehicle {vehicle} at {time_s:.3} s: no curve of the format is within {tolerance_m:?} m of the flight")]
     TooFast {
@@ -419,21 +378,6 @@ pub enum DroneError {
         vehicle: String,
         /// Time \[s\], from the start of the export until [`Self::later`] shifts it.
         time_s: f64,
-        /// Tolerance \[m\].
-        tolerance_m: f64,
-    },
-    /// Samples of a vehicle are too far from the flight.
-    #[error(
-        "vehicle {vehicle} at {time_s:.3} s: its samples are up to {found_m:.4} m from the flight, and the tolerance \
-         is {tolerance_m:?} m"
-    )]
-    TooCoarse {
-        /// Name of the vehicle.
-        vehicle: String,
-        /// Time \[s\], from the start of the export until [`Self::later`] shifts it.
-        time_s: f64,
-        /// Proved deviation \[m\].
-        found_m: f64,
         /// Tolerance \[m\].
         tolerance_m: f64,
     },
@@ -501,7 +445,7 @@ impl DroneError {
     /// Returns the error with its time counted from an earlier instant \[s\].
     #[must_use]
     pub fn later(mut self, by_s: f64) -> Self {
-        if let Self::TooFast { time_s, .. } | Self::TooCoarse { time_s, .. } | Self::TooFar { time_s, .. } = &mut self {
+        if let Self::TooFast { time_s, .. } | Self::TooFar { time_s, .. } = &mut self {
             *time_s += by_s;
         }
         self
@@ -514,19 +458,15 @@ impl DroneError {
             Self::Tolerance(_) => "give a tolerance in metres, such as 0.01".to_owned(),
             Self::Resolution { .. } => format!("give a larger {TOLERANCE}, or move the origin nearer to the flight"),
             Self::SkybVersion(_) => format!("leave {SKYB_VERSION} out, or give 1 or 2"),
-            Self::SampleRate(_) => "give a rate such as 20".to_owned(),
             Self::TooFast { .. } => {
                 format!("give a larger {TOLERANCE}, or leave a jump of the recording out by {FROM} and {UNTIL}")
             }
-            Self::TooCoarse { .. } => format!("give a larger {SAMPLE_HZ} or {TOLERANCE}"),
             Self::TooLong { compresses: true, .. } => {
                 format!("give a larger {TOLERANCE}, a shorter flight by {FROM} and {UNTIL}, or {COMPRESSED}")
             }
             Self::Duration { .. } => format!("check the unit of time, or give a shorter flight by {FROM} and {UNTIL}"),
             Self::TooLong { .. } => format!("give a larger {TOLERANCE}, or a shorter flight by {FROM} and {UNTIL}"),
-            Self::TooFar { .. } => {
-                "move the origin nearer to the flight, or export to skyc, px4-show or vviz".to_owned()
-            }
+            Self::TooFar { .. } => "move the origin nearer to the flight, or export to skyc".to_owned(),
             Self::Name { .. } => "rename the vehicle in the recording".to_owned(),
             Self::Write(_) => "free some space or write to another folder".to_owned(),
             Self::Interrupted => "run the command again".to_owned(),
@@ -539,8 +479,7 @@ impl DroneError {
         match self {
             Self::Tolerance(_) | Self::Resolution { .. } => "export/tolerance",
             Self::SkybVersion(_) => "export/skyb-version",
-            Self::SampleRate(_) => "export/sample-rate",
-            Self::TooFast { .. } | Self::TooCoarse { .. } => "export/too-fast",
+            Self::TooFast { .. } => "export/too-fast",
             Self::TooLong { .. } | Self::Duration { .. } => "export/too-long",
             Self::TooFar { .. } => "export/too-far",
             Self::Name { .. } => "export/name",

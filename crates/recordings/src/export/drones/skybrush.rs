@@ -271,7 +271,7 @@ mod tests {
     #[test]
     fn scale_grows_with_the_distance_up_to_its_largest_value() {
         let scale = |x: f64| {
-            let options = DroneOptions { tolerance_m: Some(1.0), ..DroneOptions::new(Dialect::Skyb) };
+            let options = DroneOptions { tolerance_m: 1.0, ..DroneOptions::new(Dialect::Skyb) };
             encode(&line(vector![x, 0.0, 0.0]), &options, &|| false).map(|encoded| encoded.files[0].bytes[13])
         };
         assert_eq!([1.0, 32.7, 33.0, 4000.0].map(|x| scale(x).expect("encoded")), [1, 1, 2, 123]);

@@ -8,7 +8,7 @@ use super::super::Failure;
 use super::{DroneExportRequest, Flight};
 use crate::report::Status;
 use crate::report::recorded::RecordedReport;
-use tautline_core::option::{SAMPLE_HZ, TOLERANCE};
+use tautline_core::option::TOLERANCE;
 use tautline_core::text::{at_least, at_most, counted, fixed};
 use tautline_recordings::export::drones::EncodedVehicle;
 use tautline_recordings::export::drones::motion::Deviation;
@@ -48,8 +48,7 @@ impl DroneExport {
         }
     }
 
-    /// Adds a verdict on the written motion, whose times begin `start_s` after those of the flight. The worst one is
-    /// kept.
+    /// Adds the verdict on the written motion, whose times begin `start_s` after those of the flight.
     pub(super) fn add(&mut self, report: RecordedReport, start_s: f64) {
         let closest = report.separation().into_iter().flat_map(|answer| &answer.closest);
         let name = |label: &String| {
@@ -63,21 +62,14 @@ impl DroneExport {
             Some((finding.margin(), [first, second].map(name), finding.at_s.unwrap_or_default()))
         });
         let least = margins.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(margin, who, at_s)| (margin, who, at_s + start_s));
-        let is_less = match (&least, &self.margin) {
-            (Some((new, ..)), Some((old, ..))) => new < old,
-            (least, _) => least.is_some(),
-        };
-        if report.status != Status::Clear && self.refusal.is_none() {
+        if report.status != Status::Clear {
             let shift =
                 if start_s == 0.0 { String::new() } else { format!(", whose 0 s are {start_s:?} s of the flight") };
             let message = format!("the flight is clear, but not the written motion{shift}: {}", report.headline());
-            let help =
-                format!("give a smaller {TOLERANCE} or a larger {SAMPLE_HZ}, or fly it with a larger separation");
+            let help = format!("give a smaller {TOLERANCE}, or fly it with a larger separation");
             self.refusal = Some(Failure::input("export/violation", message, help));
         }
-        if is_less || self.audit.is_none() {
-            (self.margin, self.audit) = (least, Some(report));
-        }
+        (self.margin, self.audit) = (least, Some(report));
     }
 
     /// Returns whether the files were written.
@@ -142,10 +134,9 @@ impl DroneExport {
             );
         }
         let dialect = request.dialect;
-        let [one, many] = if dialect.is_sampled() { ["sample", "samples"] } else { ["piece", "pieces"] };
         let parts = || self.vehicles.iter().map(|of| of.parts);
         let (fewest, most) = (parts().min().unwrap_or(0), parts().max().unwrap_or(0));
-        let range = counted(most as u64, one, many);
+        let range = counted(most as u64, "piece", "pieces");
         let range = if fewest == most { range } else { format!("{fewest} to {range}") };
         let bytes = self.vehicles.iter().map(|of| of.bytes).max().unwrap_or(0);
         let vehicles = counted(self.vehicles.len() as u64, "vehicle", "vehicles");

@@ -1,7 +1,7 @@
 //! `export_drones`: writes a flight for drones, and judges the written motion.
 //!
 //! The flight is audited, encoded and written beside the output. The written files are read back, compared with the
-//! flight and audited. Only files that were proved, or judged clear for sampled formats, get the name of the output.
+//! flight and audited. Only files that were proved get the name of the output.
 
 mod answer;
 mod written;
@@ -40,7 +40,7 @@ const NEWEST_SKYB: u8 = 2;
 #[cfg_attr(feature = "cli", derive(clap::Args), command(next_help_heading = "For drones"))]
 #[allow(rustdoc::broken_intra_doc_links, reason = "units are in brackets, as in the help")]
 pub struct DroneExportOptions {
-    /// Largest distance of the written motion from the flight [m] [default: 0.01; none for px4-show and vviz].
+    /// Largest distance of the written motion from the flight [m] [default: 0.01].
     #[cfg_attr(feature = "cli", arg(long = "tolerance", value_name = "METRES"))]
     #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
     pub tolerance_m: Option<f64>,
@@ -158,13 +158,13 @@ impl DroneExportRequest {
         let Self { file: ExportRequest { paths, output, sample_hz, force, .. }, dialect, options } = self;
         let has_old_version = options.skyb_version.is_some_and(|version| version != NEWEST_SKYB);
         let unused = [
-            (options.is_compressed && *dialect != Dialect::Crazyflie, COMPRESSED, "crazyflie", ""),
-            (has_old_version && *dialect != Dialect::Skyb, SKYB_VERSION, "skyb", ""),
-            (sample_hz.is_some() && !dialect.is_sampled(), SAMPLE_HZ, "px4-show", " or vviz"),
+            (options.is_compressed && *dialect != Dialect::Crazyflie, COMPRESSED, "crazyflie"),
+            (has_old_version && *dialect != Dialect::Skyb, SKYB_VERSION, "skyb"),
+            (sample_hz.is_some(), SAMPLE_HZ, "csv"),
         ];
-        if let Some((_, option, format, others)) = unused.into_iter().find(|(is_unused, ..)| *is_unused) {
+        if let Some((_, option, format)) = unused.into_iter().find(|(is_unused, ..)| *is_unused) {
             let message = format!("{option}: has no effect with {}", EXPORT_FORMAT.set(dialect.name()));
-            let help = format!("leave it out, or give {}{others}", EXPORT_FORMAT.set(format));
+            let help = format!("leave it out, or give {}", EXPORT_FORMAT.set(format));
             return Err(Failure::input("export/unused-option", message, help));
         }
         if options.ellipsoid_m.is_some() && options.obstacles.is_some() {
@@ -206,10 +206,9 @@ impl DroneExportRequest {
     fn encoding(&self, limits: &Settings) -> DroneOptions {
         let usual = DroneOptions::new(self.dialect);
         DroneOptions {
-            tolerance_m: self.options.tolerance_m.or(usual.tolerance_m),
+            tolerance_m: self.options.tolerance_m.unwrap_or(usual.tolerance_m),
             is_compressed: self.options.is_compressed,
             skyb_version: self.options.skyb_version.unwrap_or(NEWEST_SKYB),
-            sample_hz: self.file.sample_hz,
             delta_m: limits.delta_m.filter(|_| limits.ellipsoid_m.is_none()),
             ..usual
         }
@@ -352,7 +351,7 @@ impl Flight {
                 let help = format!("name the column of the height with {}", COLUMN.set("z=NAME"));
                 return Err(Failure::input("export/no-heights", message, help));
             }
-            drones::motions(recording.as_mut(), false)?
+            drones::motions(recording.as_mut())?
         };
         let has_pair = vehicles.len() > 1 || !settings.obstacles.is_empty();
         if !has_pair {

@@ -10,13 +10,13 @@ use rayon::prelude::*;
 use super::super::audit::{AuditOptions, AuditRequest, Subject};
 use super::super::{Failure, Monitor, Quiet};
 use super::{DroneExport, Flight};
-use tautline_audit::recorded::{Interpolation, Settings};
+use tautline_audit::recorded::Settings;
 use tautline_core::files::{FileError, write_atomically};
 use tautline_core::option::{OUTPUT, TOLERANCE};
 use tautline_core::track::Tracks;
 use tautline_recordings::export::drones::motion::Motion;
-use tautline_recordings::export::drones::{self, Dialect, DroneOptions, Encoded, deviation_with_rests};
-use tautline_recordings::read::{self, ReadError, ReadOptions, TimeUnit};
+use tautline_recordings::export::drones::{self, DroneOptions, Encoded, deviation_with_rests};
+use tautline_recordings::read::{self, ReadError, ReadOptions};
 
 /// Files beside the output, removed when dropped unless kept.
 pub(super) struct Written<'a> {
@@ -57,9 +57,8 @@ impl<'a> Written<'a> {
     }
 
     /// Opens the files with the public readers.
-    fn open(&self, options: &DroneOptions) -> Result<Box<dyn Tracks<Error = ReadError>>, ReadError> {
-        let time_unit = (options.dialect == Dialect::Px4Show).then_some(TimeUnit::Seconds);
-        read::open(&self.content, &ReadOptions { time_unit, ..ReadOptions::default() })
+    fn open(&self) -> Result<Box<dyn Tracks<Error = ReadError>>, ReadError> {
+        read::open(&self.content, &ReadOptions::default())
     }
 
     /// Reads the files back, compares them with the flight and judges them.
@@ -71,7 +70,7 @@ impl<'a> Written<'a> {
         monitor: &dyn Monitor,
     ) -> Result<DroneExport, Failure> {
         let start_s = flight.span_s.0;
-        let mut held = drones::motions(self.open(options)?.as_mut(), options.dialect.holds_samples())?;
+        let mut held = drones::motions(self.open()?.as_mut())?;
         let mut evaluation_m = 0.0_f64;
         for of in &encoded.vehicles {
             let read_back = held.iter_mut().find(|held| held.name == of.label).ok_or_else(|| lost(&of.label))?;
@@ -87,7 +86,7 @@ impl<'a> Written<'a> {
         let compared = compared.collect::<Result<Vec<_>, Failure>>()?;
         let deviation = compared.into_iter().max_by(|a, b| a.0.bound_m.total_cmp(&b.0.bound_m));
         if let Some((found, vehicle)) = &deviation
-            && options.tolerance_m.is_some_and(|tolerance_m| found.bound_m > tolerance_m)
+            && found.bound_m > options.tolerance_m
         {
             let message = format!("vehicle {vehicle}: the written file is {:?} m from the flight", found.bound_m);
             return Err(Failure::input("export/too-fast", message, format!("give a larger {TOLERANCE}")));
@@ -111,20 +110,10 @@ impl<'a> Written<'a> {
                     flown.radius_m.map(|radius_m| radius_m + evaluation_m);
             }
         }
-        let motions: &[_] = match options.dialect {
-            // Setpoints are held. A vehicle that follows them smoothly is between two of them.
-            Dialect::Px4Show => &[Some(Interpolation::Hold), Some(Interpolation::Linear)],
-            Dialect::Vviz => &[Some(Interpolation::Linear)],
-            _ => &[None],
-        };
         let name = self.output.display().to_string();
-        for motion in motions {
-            let subject = Subject::InMemory { name: &name, own: None, open: &|| self.open(options) };
-            let settings = Settings { motion: *motion, ..settings.clone() };
-            let audit = AuditRequest::new(subject, AuditOptions::default()).configured()?;
-            let report = audit.judge_with(settings, &Quiet::new(monitor))?.report;
-            answer.add(report, start_s);
-        }
+        let subject = Subject::InMemory { name: &name, own: None, open: &|| self.open() };
+        let audit = AuditRequest::new(subject, AuditOptions::default()).configured()?;
+        answer.add(audit.judge_with(Settings { motion: None, ..settings }, &Quiet::new(monitor))?.report, start_s);
         Ok(answer)
     }
 
