@@ -137,6 +137,8 @@ pub(super) struct Probe {
     step: f64,
     /// Last time of each vehicle \[units\].
     last_of: Vec<Option<f64>>,
+    /// Number of rows.
+    pub(super) rows: u64,
     /// Number of steps of one vehicle, and of those that are at least 2 and at least 1000 seconds in each unit.
     steps: u64,
     long_steps: [[u64; 2]; TimeUnit::ALL.len()],
@@ -157,6 +159,7 @@ impl Probe {
             last_time: first.since(0),
             step: f64::INFINITY,
             last_of: Vec::new(),
+            rows: 0,
             steps: 0,
             long_steps: Default::default(),
             whole,
@@ -167,6 +170,7 @@ impl Probe {
 
     /// Records the time of a row of a vehicle.
     pub(super) fn observe(&mut self, stamp: Stamp, vehicle: usize) {
+        self.rows += 1;
         if vehicle >= self.last_of.len() {
             self.last_of.resize(vehicle + 1, None);
         }
@@ -196,6 +200,11 @@ impl Probe {
             self.first = stamp;
         }
         (self.last, self.last_time) = (stamp, time);
+    }
+
+    /// Returns whether all rows have one time.
+    pub(super) fn is_one_instant(&self) -> bool {
+        self.step.is_infinite()
     }
 
     /// Returns the most likely unit for times of this size and step, the reason, and the other unit that fits as well.

@@ -12,6 +12,7 @@ use super::agreement::FrameAgreement;
 use super::aviation::ClimbMonitor;
 use super::axes::Axes;
 use super::cells::Cells;
+use super::clock::Probe;
 use super::earth::{is_no_fix, no_fixes};
 use super::error::{ContentKind, Fault, list, quoted, refuse};
 use super::identity::{AlternativeId, SuspectColumn, SwapMonitor};
@@ -157,8 +158,27 @@ impl Evidence {
         Ok(())
     }
 
-    /// Refuses two vehicle columns that contradict each other.
-    pub(super) fn check_names(&self, header: &[String], id: usize) -> Result<(), Fault> {
+    /// Refuses a vehicle column that numbers the rows, and two vehicle columns that contradict each other. `vehicles`
+    /// is the number of names, `probe` has the times of all rows.
+    pub(super) fn check_names(
+        &self,
+        header: &[String],
+        layout: &Layout,
+        id: usize,
+        vehicles: usize,
+        probe: &Probe,
+    ) -> Result<(), Fault> {
+        // Two rows at two times may belong to two vehicles.
+        if probe.rows > 2 && vehicles as u64 == probe.rows && !probe.is_one_instant() && !layout.is_id_given {
+            let others = layout.alternative_ids.iter().chain(&layout.suspects);
+            let others: Vec<_> = others.map(|&column| quoted(&header[column])).collect();
+            let mut problem = names_no_vehicle(&header[id]);
+            if !others.is_empty() {
+                problem += &format!("; the other columns are {}", others.join(", "));
+            }
+            let remedy = format!("name the column of the vehicle with {}, or remove this one", COLUMN.set("id=NAME"));
+            return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
+        }
         let Some(alternative) = self.alternative_ids.iter().find(|alternative| alternative.is_one()) else {
             return Ok(());
         };
@@ -225,6 +245,6 @@ impl Evidence {
 }
 
 /// Returns the problem of a vehicle column that numbers the rows.
-pub(super) fn names_no_vehicle(column: &str) -> String {
+fn names_no_vehicle(column: &str) -> String {
     format!("column {} has a different value in each row and so names no vehicle", quoted(column))
 }

@@ -569,11 +569,12 @@ impl<'a> Columns<'a> {
         let mut facts = vec![layout.identity(self.header, options)];
         let lengths = layout.bodies.iter().flat_map(|body| body.position).flatten();
         let unit_of = |column: usize| self.units.get(&column).map(|unit| (*unit).to_owned());
+        // Heights beside latitudes and longitudes may be in feet. Other numbers have one unit of length.
+        let may_be_feet = layout.on_earth && !aviation::is_state_vectors(self.header);
         let unit = |kind: FactKind, unit: Option<String>| match (options.scale, unit) {
             (Some(_), _) => Fact::number(kind, Source::Declared, options.metres(), "m"),
             (None, Some(unit)) => Fact::name(kind, Source::Deduced, unit),
-            // Heights beside latitudes and longitudes may be in feet. Other numbers have one unit of length.
-            (None, None) if kind == FactKind::HeightUnit && layout.on_earth => Fact::name(kind, Source::Default, "m"),
+            (None, None) if kind == FactKind::HeightUnit && may_be_feet => Fact::name(kind, Source::Default, "m"),
             (None, None) => Fact::name(kind, Source::Convention, "m"),
         };
         if !layout.on_earth {
@@ -582,11 +583,7 @@ impl<'a> Columns<'a> {
         let height = self.heights_of(layout).first_key_value().map(|(column, _)| *column);
         let third = layout.bodies.first().and_then(|body| body.position[2]);
         if let Some(column) = height.or(third.filter(|_| layout.on_earth)) {
-            let is_convention = aviation::is_state_vectors(self.header) && options.scale.is_none();
-            facts.push(match unit_of(column) {
-                None if is_convention => Fact::name(FactKind::HeightUnit, Source::Convention, "m"),
-                named => unit(FactKind::HeightUnit, named),
-            });
+            facts.push(unit(FactKind::HeightUnit, unit_of(column)));
             let (source, reference) = heading::height_reference(&self.header[column]);
             facts.push(Fact::name(FactKind::HeightReference, source, reference));
         }

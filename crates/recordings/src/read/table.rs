@@ -9,7 +9,7 @@ use super::clock::{Date, Probe, Stamp};
 use super::convention::{self, GLOBAL};
 use super::earth::{EarthFrame, Geodetic, is_no_fix};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
-use super::evidence::{Evidence, names_no_vehicle};
+use super::evidence::Evidence;
 use super::identity::Names;
 use super::layout::{Layout, VehicleColumns};
 use super::options::ReadOptions;
@@ -293,7 +293,6 @@ impl<C: Cells> Rows for Table<C> {
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;
         let mut probe = None;
-        let (mut rows, mut first, mut is_one_instant) = (0, None, true);
         while self.cells.advance()? {
             let stamp = self.stamp().and_then(|stamp| {
                 let vehicle = self.vehicle(id)?;
@@ -301,24 +300,10 @@ impl<C: Cells> Rows for Table<C> {
             });
             let stamp = stamp.map_err(|fault| self.cells.fault(fault))?;
             observe(&mut probe, stamp, self.vehicle);
-            rows += 1;
-            is_one_instant &= *first.get_or_insert(stamp) == stamp;
         }
-        let header = self.cells.header();
-        // Two rows at two times may belong to two vehicles.
-        if rows > 2 && self.names.all().len() == rows && !is_one_instant && !self.layout.is_id_given {
-            let others = self.layout.alternative_ids.iter().chain(&self.layout.suspects);
-            let others: Vec<_> = others.map(|&column| quoted(&header[column])).collect();
-            let others = if others.is_empty() {
-                others.concat()
-            } else {
-                format!("; the other columns are {}", others.join(", "))
-            };
-            let problem = names_no_vehicle(&header[id]) + &others;
-            let remedy = format!("name the column of the vehicle with {}, or remove this one", COLUMN.set("id=NAME"));
-            return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
+        if let Some(probe) = &probe {
+            self.evidence.check_names(self.cells.header(), &self.layout, id, self.names.all().len(), probe)?;
         }
-        self.evidence.check_names(header, id)?;
         Ok(probe)
     }
 }
@@ -385,8 +370,8 @@ fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option
     Ok(None)
 }
 
-/// Converts a position with an origin in its row to the first of `frames`; returns `false` if the origin is unknown or a
-/// validity column is 0. The second of `frames` is that of the last origin.
+/// Converts a position with an origin in its row to the first of `frames`; returns `false` if the origin is unknown or
+/// a validity column is 0. The second of `frames` is that of the last origin.
 fn convert_to_local(
     cells: &impl Cells,
     row: &mut Row,
