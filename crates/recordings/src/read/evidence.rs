@@ -172,10 +172,8 @@ impl Evidence {
         if probe.rows > 2 && vehicles as u64 == probe.rows && !probe.is_one_instant() && !layout.is_id_given {
             let others = layout.alternative_ids.iter().chain(&layout.suspects);
             let others: Vec<_> = others.map(|&column| quoted(&header[column])).collect();
-            let mut problem = names_no_vehicle(&header[id]);
-            if !others.is_empty() {
-                problem += &format!("; the other columns are {}", others.join(", "));
-            }
+            let prefix = if others.is_empty() { "" } else { "; the other columns are " };
+            let problem = names_no_vehicle(&header[id]) + prefix + &others.join(", ");
             let remedy = format!("name the column of the vehicle with {}, or remove this one", COLUMN.set("id=NAME"));
             return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
         }

@@ -213,18 +213,16 @@ pub fn encode(
     let labels = labels(flight, options.dialect)?;
     let work = Work { options, is_interrupted };
     let vehicles: Vec<_> = flight.iter().zip(labels).map(|((name, motion), label)| (name, label, motion)).collect();
-    match options.dialect {
-        Dialect::Skyc => skybrush::show(&work, &vehicles),
-        _ => {
-            let encoded = vehicles.par_iter().map(|(name, label, motion)| match options.dialect {
-                Dialect::Crazyflie if options.is_compressed => crazyflie::compressed(&work, name, label, motion),
-                Dialect::Crazyflie => crazyflie::polynomials(&work, name, label, motion),
-                _ => skybrush::trajectory(&work, name, label, motion),
-            });
-            let (files, vehicles) = first_error(encoded)?.into_iter().unzip();
-            Ok(Encoded { files, vehicles })
-        }
+    if options.dialect == Dialect::Skyc {
+        return skybrush::show(&work, &vehicles);
     }
+    let encoded = vehicles.par_iter().map(|(name, label, motion)| match options.dialect {
+        Dialect::Crazyflie if options.is_compressed => crazyflie::compressed(&work, name, label, motion),
+        Dialect::Crazyflie => crazyflie::polynomials(&work, name, label, motion),
+        _ => skybrush::trajectory(&work, name, label, motion),
+    });
+    let (files, vehicles) = first_error(encoded)?.into_iter().unzip();
+    Ok(Encoded { files, vehicles })
 }
 
 /// Returns whether the content of a file is that of an export to a folder.
