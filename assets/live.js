@@ -82,9 +82,10 @@ const restart = () => {
   const free = Array.from({ length: INSTANTS - CORNERS - trails.length }, () => absent);
   root.querySelector("script").textContent = JSON.stringify({
     ...empty, vehicles: names, radius_m: names.map(() => radius), shell_m: [delta / 2, delta / 2, delta / 2],
-    delta_m: delta, times_s: packed(times), points: names.length, starts: packed(new Int32Array(3 * names.length)),
-    places: [...corners(half), ...free, ...trails], cell_m: 1, origin_m: middle, middle_m: middle, half_m: half,
-    square_m: square, ground: [[-most, -most, low], [most, most, low]], near_s: packed(first), near_who: packed(nobody),
+    delta_m: delta, clearance_m: delta, times_s: packed(times), points: names.length,
+    starts: packed(new Int32Array(3 * names.length)), places: [...corners(half), ...free, ...trails], cell_m: 1,
+    origin_m: middle, middle_m: middle, half_m: half, swarm_m: half, square_m: square,
+    ground: [[-most, -most, low], [most, most, low]], near_s: packed(first), near_who: packed(nobody),
   });
   const old = controls(), hasFocus = document.activeElement?.matches(".replay-view");
   // The start of a replay moves the focus into the view, and thus scrolls the page. An inert view takes no focus.

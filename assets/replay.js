@@ -17,7 +17,7 @@
  */
 /**
  * Obstacle. `radius_m` is that of a ball, which has no triangles. `path` is a list of [t, x, y, z].
- * @typedef {{name: string, radius_m: number | null, solid: Packed, rims: Packed, opacity: number,
+ * @typedef {{radius_m: number | null, solid: Packed, rims: Packed, opacity: number,
  *   path: number[][]}} Thing
  */
 /**
@@ -28,32 +28,33 @@
  * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more. A live view has `places` for its last
  * instants in the form of `push`.
  * @typedef {{limits: {named: number, trails: number[], drops: number, slots: number, links: number, colours: number},
- *   vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: Packed, middle_m: number[],
- *   origin_m: number[], half_m: number[], cell_m: number,
+ *   tangent: number, light: number[], vehicles: string[], radius_m: number[], shell_m: number[] | null,
+ *   times_s: Packed, middle_m: number[], origin_m: number[], half_m: number[], swarm_m: number[], cell_m: number,
  *   viewpoint: {azimuth_deg: number, elevation_deg: number, across: number | null},
  *   points: number, starts: Packed,
  *   steps: Packed, breaks: Packed, near_s: Packed, near_who: Packed, holds: boolean, nearest: [number, string][],
  *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: number[][], square_m: number,
- *   rotors: {at_m: number[][], radius_m: number} | null, turns: Packed, links: Packed, tension: boolean,
+ *   clearance_m: number, rotors: {ends_m: number[][], rotor_m: number, body_m: number, arm_m: number} | null,
+ *   turns: Packed, links: Packed, link_look: [number, number], tension: boolean,
  *   delta_m: number, lights: boolean, formations: {from_s: number, slots: Packed}[], axis_m: number,
  *   axes: number | null, reference: number | null, places?: number[][]}} Data
  */
 /** @typedef {{vao: WebGLVertexArrayObject | null, count: number, buffer: WebGLBuffer | null}} Mesh */
 /** @typedef {{made: WebGLProgram, at: Object<string, WebGLUniformLocation>}} Program */
 
-// A step of ABSENT along x marks a point that is not there. TANGENT is that of half the camera's angle of view. RED is
-// the largest number of red pieces of trails. The camera fits at most SAMPLES positions.
-const ABSENT = -32768, TRAIL_PIECES = 24000, TANGENT = 0.36, RED = 40000, SAMPLES = 4000;
+// A step of ABSENT along x marks a point that is not there. RED is the largest number of red pieces of trails. The
+// camera fits at most SAMPLES positions.
+const ABSENT = -32768, TRAIL_PIECES = 24000, RED = 40000, SAMPLES = 4000;
 const UPRIGHT = Math.PI / 2;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
 // Uniforms that are integers.
 const WHOLE = new Set(["path", "paint", "value", "turn", "row", "next", "points", "kind", "stride", "newest", "axis",
   "mark"]);
-// Names of the page's colours (crates/report/src/report/page/style.css); `c1` to `c8` are those of the vehicles.
-const COLOURS = ["sky", "ink", "floor", "shell", "thing", "alarm", "push", "rest", "pull", "c1", "c2", "c3", "c4", "c5",
-  "c6", "c7", "c8"];
-// Colours of lights from the left to the right of the swarm, and of the sky behind them.
-const LIGHTS = [[255, 194, 61], [111, 227, 154], [79, 184, 255], [176, 148, 255]], NIGHT = [6, 10, 24];
+// Names of the page's colours (crates/report/src/drawing/colours.rs): `c` for vehicles, `q` for quantities from small
+// to large, `l` for lights from the left to the right of the swarm.
+const QUANTITIES = ["q1", "q2", "q3", "q4"], LIGHTS = ["l1", "l2", "l3", "l4"];
+const COLOURS = ["sky", "ink", "floor", "shell", "thing", "alarm", "push", "rest", "pull", "night", "c1", "c2", "c3",
+  "c4", "c5", "c6", "c7", "c8", ...QUANTITIES, ...LIGHTS];
 // Layers in the order of their keys 1 to 8.
 const LAYERS = ["shells", "links", "trails", "slots", "ground", "names", "closest", "caption"];
 // An entry with a third word is there if the flight has such a moment or layer.
@@ -126,7 +127,7 @@ const shader = name => {
 /** Adds the player of a flight to a page. @param {HTMLElement} root @param {Data} data */
 const play = (root, data) => {
   const count = data.vehicles.length, half = data.half_m, reach = Math.hypot(...half);
-  const { radius_m: radius, moments, limits } = data, least_m = Math.min(...radius);
+  const { radius_m: radius, moments, limits, tangent: TANGENT } = data, least_m = Math.min(...radius);
   const times = new Float64Array(bytes(data.times_s));
   const first = times[0], last = times[times.length - 1];
   const nearS = new Float64Array(bytes(data.near_s)), nearWho = new Uint16Array(bytes(data.near_who));
@@ -162,9 +163,9 @@ const play = (root, data) => {
       turned.set([...vector, Math.sqrt(Math.max(1 - Math.hypot(...vector) ** 2, 0))], to);
     }
   }
-  const arm = Math.max(...(rotors?.at_m ?? []).map(([x, y]) => Math.hypot(x, y)), 0);
+  const arm = rotors?.arm_m ?? 0;
   // Distance from the centre to the farthest drawn point of each vehicle [m].
-  const outer = rotors ? radius.map(() => arm + rotors.radius_m) : radius;
+  const outer = rotors ? radius.map(() => arm + rotors.rotor_m) : radius;
   const shell = data.shell_m ? Math.max(...data.shell_m) : 0;
 
   // Elements.
@@ -175,7 +176,6 @@ const play = (root, data) => {
   if (!gl) throw new Error("This browser does not draw WebGL 2: a still picture replaces the replay.");
   const names = /** @type {HTMLCanvasElement} */ (make("canvas", { class: "replay-names", "aria-hidden": "true" }));
   const state = make("p", { class: "replay-state" }), chosen = make("p", { class: "replay-picked" });
-  const rate = make("p", { class: "replay-rate", title: "frames a second, script time of each" });
   const scale = make("p", { class: "replay-scale" });
   const said = make("p", { class: "replay-said", role: "status" }), clock = make("output", { class: "replay-clock" });
   const head = make("i", { class: "replay-head" });
@@ -252,7 +252,7 @@ const play = (root, data) => {
   question.setAttribute("aria-label", "Keys");
   const graph = /** @type {HTMLElement | null} */ (root.querySelector(".replay-graph"));
   const track = make("div", { class: "replay-track" }, ...graph ? [graph] : [], head, scrub);
-  const stage = make("div", { class: "replay-stage" }, canvas, names, state, chosen, said, scale, rate, help);
+  const stage = make("div", { class: "replay-stage" }, canvas, names, state, chosen, said, scale, help);
   const panel = make("div",
     { class: "replay-panel", role: "group", "aria-label": "Replay of " + (root.dataset.label ?? "a flight") },
     stage, make("div", { class: "replay-time" }, start, track, clock, question),
@@ -261,8 +261,8 @@ const play = (root, data) => {
     make("div", { class: "replay-buttons" }, ...legend));
   root.prepend(panel);
 
-  // Time [s]. `frames` were drawn in `passed` ms; the script took `spent` ms of them. `queued` is the next frame.
-  let t = first, playing = false, ended = false, queued = 0, before = 0, frames = 0, passed = 0, spent = 0;
+  // Time [s]. `queued` is the next frame, `before` the time of the last one while playing [ms].
+  let t = first, playing = false, ended = false, queued = 0, before = 0;
   let current = /** @type {Moment | null} */ (null);
   /** Shows the sentence of a moment, or none. @param {Moment | null} moment */
   const announce = moment => { current = moment; write(said, moment?.said ?? ""); };
@@ -277,7 +277,7 @@ const play = (root, data) => {
     playing = !playing;
     if (playing && t >= last) t = first;
     write(start, playing ? "Pause" : "Play");
-    before = frames = passed = spent = 0;
+    before = 0;
     announce(null);
     ask();
   };
@@ -309,24 +309,11 @@ const play = (root, data) => {
     queued = 0;
     if (ended) return;
     if (playing) {
-      if (before) {
-        passed += now - before;
-        frames++;
-        t += Math.min((now - before) / 1000, 0.1) * +speeds.value;
-      }
-      // The page was hidden: the interval measures nothing.
-      if (now - before > 1000) passed = frames = spent = 0;
+      if (before) t += Math.min((now - before) / 1000, 0.1) * +speeds.value;
       before = now;
-      if (passed > 500) {
-        [root.dataset.fps, root.dataset.scriptMs] = [(1000 * frames / passed).toFixed(0), (spent / frames).toFixed(2)];
-        if (/[?&]fps/.test(location.search)) write(rate, `${root.dataset.fps} fps, ${root.dataset.scriptMs} ms`);
-        frames = passed = spent = 0;
-      }
       if (t >= last) { t = last; toggle(); }
     }
-    const began = performance.now();
     draw();
-    spent += performance.now() - began;
     if (playing) ask();
   };
 
@@ -374,25 +361,14 @@ const play = (root, data) => {
   };
   /** Distance at which a camera that follows the swarm always shows all of it [m]. */
   const close = () => {
-    const { right, up } = axes(), room = TANGENT * aspect() * 0.94;
-    let need = 0;
-    for (let row = 0, by = Math.ceil(times.length * count / SAMPLES); row < times.length; row += by) {
-      const there = [...radius.keys()].map(k => (row * wide + k) * 4).filter(at => path[at + 3]);
-      for (const [axis, half] of /** @type {[number[], number][]} */ ([[right, room], [up, 0.84 * TANGENT]])) {
-        const at = there.map(k => dot(path.subarray(k), axis));
-        const mean = at.reduce((sum, x) => sum + x, 0) / at.length;
-        for (const x of at) need = Math.max(need, (Math.abs(x - mean) + Math.max(shell, outer[0])) / half);
-      }
-    }
-    return need;
+    const [across, high] = [axes().right, axes().up].map(axis => dot(axis.map(Math.abs), data.swarm_m));
+    return 1.05 * Math.max(across / aspect() / 0.94, high / 0.84) / TANGENT;
   };
   /** Shows everything in perspective (0), from the top (1), the front (2) or the side (3). @param {number} k */
   const look = k => { [yaw, pitch, parallel] = VIEWS[k]; fit(); ask(); };
-  /** Positions of the vehicles that are there [m]. */
-  const present = () => radius.map((_, k) => place(k)).filter(at => at[3]);
-  /** Their centre [m]. */
+  /** Centre of the vehicles that are there [m]. */
   const centre = () => {
-    const all = present();
+    const all = radius.map((_, k) => place(k)).filter(at => at[3]);
     return all.length ? [0, 1, 2].map(axis => all.reduce((sum, at) => sum + at[axis], 0) / all.length) : target;
   };
   /** Moves the camera near what it follows. */
@@ -400,12 +376,7 @@ const play = (root, data) => {
     if (follow.value === "picked") {
       picked ??= 0;
       distance = Math.max(16 * outer[picked], 8 * shell);
-    } else if (follow.value === "swarm") {
-      seek();
-      const at = centre();
-      const far = Math.max(...present().map(of => Math.hypot(of[0] - at[0], of[1] - at[1], of[2] - at[2])), 0);
-      distance = 1.15 * (far + Math.max(shell, outer[0])) / TANGENT;
-    }
+    } else if (follow.value === "swarm") distance = close();
   };
   /** How far the eye of a parallel view is moved back [m], so that everything is ahead of it. */
   const behind = () => parallel ? 12 * reach : 0;
@@ -605,8 +576,8 @@ const play = (root, data) => {
   texture(1, gl.RGBA8, count, 2, gl.UNSIGNED_BYTE, paint);
   texture(2, gl.R32F, 1, 1, gl.FLOAT, new Float32Array(1));
   texture(3, gl.RGBA32F, rotors ? count : 1, rotors ? times.length : 1, gl.FLOAT, turned);
-  const arms = rotors ? [...rotors.at_m.flatMap(at => [...at, 0.18 * arm]), 0.75 * arm, 0, 0] : new Array(15).fill(0);
-  const bodies = mesh([3], 1, 1, Float32Array.from(radius, of => rotors ? 0.34 * arm : of));
+  const arms = rotors?.ends_m.flat() ?? new Array(15).fill(0);
+  const bodies = mesh([3], 1, 1, Float32Array.from(radius, of => rotors?.body_m ?? of));
   const shells = mesh([3], 1, 1, Float32Array.from(radius)), slots = mesh([0], 3, 1);
   const links = mesh([2], 3, 1), pairs = mesh([2], 3, 1);
   const ground = mesh([0, 1], 3, 1);
@@ -634,6 +605,8 @@ const play = (root, data) => {
   let painted = "", shape = -1, lit = false, row = 0, next = 0, part = 0, near = /** @type {number[]} */ ([]);
   /** Colours by name. @type {Object<string, number[]>} */
   let colours = {};
+  /** Colours of quantities from the smallest to the largest number. */
+  let ramp = QUANTITIES;
   /** Smallest and largest number of the colour scale; equal where vehicles have colours of their own. */
   let spanned = [0, 0];
   /** Applies the colours of the page. */
@@ -680,20 +653,14 @@ const play = (root, data) => {
     themed();
     if (!kind || lit) return;
     const numbers = new Float32Array(times.length * count);
-    let low = Infinity, high = -Infinity;
-    for (let row = 0; row < times.length; row++) {
-      const some = at(row);
-      numbers.set(some, row * count);
-      for (const x of some) if (x < Infinity) [low, high] = [Math.min(low, x), Math.max(high, x)];
-    }
-    if (kind === "speed") low = 0; else if (data.shell_m) high = Math.min(high, Math.max(low, 0) + 4 * shell);
+    for (let row = 0; row < times.length; row++) numbers.set(at(row), row * count);
+    const high = kind === "speed" ? numbers.reduce((most, x) => Math.max(most, x), 1e-9) : data.clearance_m;
     gl.deleteTexture(gl.getParameter((gl.activeTexture(gl.TEXTURE2), gl.TEXTURE_BINDING_2D)));
     texture(2, gl.R32F, count, times.length, gl.FLOAT, numbers);
-    spanned = [low, Math.max(high, low + 1e-9)];
-    const [unit, ends] = kind === "speed" ? ["m/s", ["pull", "push"]] : ["m", ["push", "pull"]];
-    scale.append(`${kind} ${low.toFixed(2)}`, make("i", {
-      style: `background:linear-gradient(90deg,var(--${ends[0]}),var(--rest),var(--${ends[1]}))` }),
-    `${high.toFixed(2)} ${unit}`);
+    spanned = [0, high];
+    ramp = kind === "speed" ? QUANTITIES : [...QUANTITIES].reverse();
+    scale.append(kind + " 0.00", swatch(`linear-gradient(90deg,${ramp.map(name => `var(--${name})`)})`),
+      `${high.toFixed(2)} ${kind === "speed" ? "m/s" : "m"}`);
   };
   /**
    * Fits a canvas to its size on the page. Returns device pixels per CSS pixel, 0 for a canvas without a size.
@@ -769,7 +736,7 @@ const play = (root, data) => {
   /** Colour of a light at a part of the width of the swarm. @param {number} at */
   const light = at => {
     const part = clamp(at, 0, 1) * 2.999, k = Math.floor(part);
-    return LIGHTS[k].map((from, channel) => Math.round(from + (LIGHTS[k + 1][channel] - from) * (part - k)));
+    return mix(colours[LIGHTS[k]], colours[LIGHTS[k + 1]], part - k).map(Math.round);
   };
   const draw = () => {
     const ratio = sizeOf(canvas);
@@ -798,7 +765,7 @@ const play = (root, data) => {
     }
     reform();
     gl.viewport(0, 0, size[0], size[1]);
-    gl.clearColor(...(/** @type {[number, number, number, number]} */ (rgba(lit ? NIGHT : colours.sky))));
+    gl.clearColor(...(/** @type {[number, number, number, number]} */ (rgba(lit ? colours.night : colours.sky))));
     gl.enable(gl.DEPTH_TEST);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
@@ -815,17 +782,13 @@ const play = (root, data) => {
           const to = at[name], value = given[name];
           if (!to) continue;
           if (typeof value === "number") { if (WHOLE.has(name)) gl.uniform1i(to, value); else gl.uniform1f(to, value); }
-          else if (value.length === 15) gl.uniform3fv(to, value);
           else if (value.length === 2) gl.uniform2fv(to, value);
-          else if (value.length === 3) gl.uniform3fv(to, value); else gl.uniform4fv(to, value);
+          else if (value.length === 4) gl.uniform4fv(to, value); else gl.uniform3fv(to, value);
         }
       };
-      const ends = [colours.pull, colours.push].map(colour => rgba(colour).slice(0, 3));
-      if (colouring.value === "clearance") ends.reverse();
       set({ right, up, back, eye, lens, size, parallel: parallel ? distance : 0, path: 0, paint: 1, value: 2, turn: 3,
-        row, next, part, level: data.ground[0][2], points: count, spanned, low: ends[0],
-        mid: rgba(colours.rest).slice(0, 3),
-        high: ends[1], arm, armLeast: 8 * ratio,
+        row, next, part, level: data.ground[0][2], points: count, spanned, light: data.light,
+        "ramp[0]": ramp.flatMap(name => rgba(colours[name]).slice(0, 3)), arm, armLeast: 8 * ratio,
         "arms[0]": arms, shell: [0, 0, 0], offset: [0, 0, 0], fixedAt: [0, 0, 0, 0], fixedPaint: [0, 0, 0, 0],
         ...values });
     };
@@ -888,10 +851,9 @@ const play = (root, data) => {
       set({ kind: 3, width: 3 * ratio, tint: rgba(colours.alarm) });
       quads(reds);
     }
-    const many = links.count;
-    set({ kind: 1, width: clamp(2.2 - many / 200, 1, 2.2) * ratio, delta: data.tension ? data.delta_m : -1,
+    set({ kind: 1, width: data.link_look[0] * ratio, delta: data.tension ? data.delta_m : -1,
       tint: [0, 0, 0, 0], push: rgba(colours.push), pull: rgba(colours.pull),
-      rest: rgba(colours.rest, clamp(36 / many, 0.08, 0.9)) });
+      rest: rgba(colours.rest, data.link_look[1]) });
     if (shows.links) quads(links);
     // Lines of the closest pair, as the page's data names it, and of all pairs in violation.
     const k = 2 * upTo(nearS, t) - 2, slice = [nearWho[k], nearWho[k + 1]].filter(vehicle => vehicle < count);
@@ -921,7 +883,7 @@ const play = (root, data) => {
     if (rotor) {
       use(line, { kind: 4, width: 2.2 * ratio, tint: rgba(colours.ink) });
       quads(null, 5 * count);
-      use(rotor, { rotor: rotors?.radius_m ?? 0 });
+      use(rotor, { rotor: rotors?.rotor_m ?? 0 });
       quads(null, 4 * count);
     }
     const glow_m = Math.max(4 * least_m, 1.9 * shell), width_px = canvas.clientWidth;
@@ -1014,8 +976,7 @@ const play = (root, data) => {
   themed();
   look(from.across === null ? 0 : 3 - from.across);
   // The camera follows lights, and a swarm that travels far.
-  const apart = close();
-  if (data.lights || apart < 0.5 * distance) [follow.value, distance] = ["swarm", 1.05 * apart];
+  if (data.lights || close() < 0.5 * distance) [follow.value, distance] = ["swarm", close()];
   return {
     root, draw,
     /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */

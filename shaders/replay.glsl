@@ -7,8 +7,7 @@
 @ COMMON
 #version 300 es
 precision highp float; precision highp int; precision highp sampler2D;
-uniform vec3 right, up, back, eye; uniform vec4 lens; uniform vec2 size; uniform float parallel;
-const vec3 LIGHT = vec3(-.408, .577, .707);
+uniform vec3 right, up, back, eye, light; uniform vec4 lens; uniform vec2 size; uniform float parallel;
 // Axes of the camera (view space): right, up, towards the camera.
 vec3 turned(vec3 v) { return vec3(dot(right, v), dot(up, v), dot(back, v)); }
 vec3 view(vec3 p) { return turned(p - eye); }
@@ -24,7 +23,7 @@ vec4 toClip(vec3 p) {
 // between the instants `row` and `next`. `paint` has the colour of each vehicle.
 // `value` has a number for each vehicle and instant, which colours it if `spanned` is a range; `turn` has attitudes.
 uniform sampler2D path, paint, value, turn; uniform int row, next; uniform float part; uniform int points;
-uniform vec2 spanned; uniform vec3 low, mid, high;
+uniform vec2 spanned; uniform vec3 ramp[4];
 vec4 point(int k, int instant) { return texelFetch(path, ivec2(k, instant), 0); }
 // Position of a point at the time of the picture, and 0 where it is absent.
 vec4 place(int k) {
@@ -34,8 +33,9 @@ vec4 place(int k) {
 // Colour of a vehicle at an instant: its own, or that of its number.
 vec3 hue(int k, int instant) {
   if (spanned.y <= spanned.x) return texelFetch(paint, ivec2(k, 1), 0).rgb;
-  float s = clamp((texelFetch(value, ivec2(k, instant), 0).r - spanned.x) / (spanned.y - spanned.x), 0., 1.);
-  return s < .5 ? mix(low, mid, 2. * s) : mix(mid, high, 2. * s - 1.);
+  float s = 3. * clamp((texelFetch(value, ivec2(k, instant), 0).r - spanned.x) / (spanned.y - spanned.x), 0., 1.);
+  int n = min(int(s), 2);
+  return mix(ramp[n], ramp[n + 1], s - float(n));
 }
 // Colour of a vehicle at the time of the picture; that of an alarm in a violation.
 vec3 hueNow(int k) {
@@ -114,8 +114,8 @@ void main() {
     float rim = 1. - abs(dot(n, towards));
     pixel = vec4(colour.rgb, colour.a * edge * (.1 + .9 * rim * rim * rim));
   } else {
-    float lit = .5 + .5 * max(dot(n, LIGHT), 0.);
-    float gloss = .16 * pow(max(dot(n, normalize(LIGHT + towards)), 0.), 48.);
+    float lit = .5 + .5 * max(dot(n, light), 0.);
+    float gloss = .16 * pow(max(dot(n, normalize(light + towards)), 0.), 48.);
     pixel = vec4(colour.rgb * lit + gloss, edge);
   }
 }
@@ -233,5 +233,5 @@ in vec3 from, to; uniform vec3 offset; uniform vec4 tint; out vec4 colour;
 void main() {
   gl_Position = toClip(view(from + offset));
   vec3 n = turned(to);
-  colour = vec4(tint.rgb * (dot(to, to) > 0. ? .62 + .38 * max(dot(n, LIGHT), 0.) : 1.), tint.a);
+  colour = vec4(tint.rgb * (dot(to, to) > 0. ? .62 + .38 * max(dot(n, light), 0.) : 1.), tint.a);
 }

@@ -1,6 +1,7 @@
 // Shaders of the scene: balls, faces, shells, lines and discs.
 //
-// View space has the camera's axes: right, up, towards the camera [m].
+// View space has the camera's axes: right, up, towards the camera [m]. `gpu/pipelines.rs` of crates/render puts the
+// constants of the light before this file: LIGHT, AMBIENT, GLOSS, SHININESS.
 
 struct Camera {
     right: vec4<f32>,
@@ -65,11 +66,6 @@ struct Shade {
     @builtin(frag_depth) depth: f32,
     @builtin(sample_mask) samples: u32,
 }
-
-// White light from above the camera's left shoulder.
-const LIGHT = vec3(-0.408, 0.577, 0.707);
-const AMBIENT = 0.38;
-const GLOSS = 0.16;
 
 // Whether a ball is outside of one of the four side planes of the view frustum.
 fn is_aside(centre: vec3<f32>, radius: f32) -> bool {
@@ -192,7 +188,7 @@ fn solid(corner: BallCorner) -> Shade {
         discard;
     }
     let lit = AMBIENT + (1.0 - AMBIENT) * max(dot(hit.normal, LIGHT), 0.0);
-    let gloss = GLOSS * pow(max(dot(hit.normal, normalize(LIGHT + hit.view)), 0.0), 48.0);
+    let gloss = GLOSS * pow(max(dot(hit.normal, normalize(LIGHT + hit.view)), 0.0), SHININESS);
     return Shade(vec4(corner.colour.rgb * lit + gloss, 1.0), hit.depth, hit.samples);
 }
 

@@ -43,7 +43,7 @@ pub(super) fn figure_formats(names: &[String]) -> Vec<Format> {
 /// Returns the renderer of pictures on an adapter. A build without the viewer draws nothing.
 #[cfg(feature = "viewer")]
 pub(super) fn pictures(adapter: &str, takes_snapshots: bool) -> Box<dyn Pictures> {
-    Box::new(tautline_render::RunPictures::new(adapter).with_snapshots(takes_snapshots))
+    Box::new(tautline_render::RunPictures { adapter: adapter.to_owned(), takes_snapshots })
 }
 
 /// Returns the renderer of pictures on an adapter. A build without the viewer draws nothing.

@@ -153,6 +153,16 @@ pub(super) fn check_lengths<'a>(
     })
 }
 
+/// Checks that a picture of this width and height can be drawn \[pixels\].
+pub(super) fn check_size([width, height]: [u32; 2], largest_px: u32, painter: &str) -> Result<(), RenderError> {
+    if [width, height].into_iter().all(|side| (1..=largest_px).contains(&side)) {
+        return Ok(());
+    }
+    Err(RenderError::PictureSize(format!(
+        "a picture of {width} x {height} pixels cannot be drawn: {painter} draws from 1 to {largest_px} pixels a side"
+    )))
+}
+
 impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
         match error {

@@ -17,8 +17,9 @@ use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::record::{Event, Sample};
 use tautline_core::swarm::{Pair, Rows, row, separation};
 use tautline_recordings::mcap::{ExtraTopic, Topic};
+use tautline_report::drawing::Rotors;
+use tautline_report::drawing::colours::{ALARM, OBSTACLE, SHELL};
 use tautline_report::flight_log::attitudes_of;
-use tautline_report::replay::Rotors;
 use tautline_sim::scenario::Scenario;
 
 /// Rate of scenes \[Hz\].
@@ -71,59 +72,55 @@ impl FoxgloveScene {
         // A vehicle is chosen where the share of vehicles up to it passes an integer.
         let share = |k: usize| k * MAX_VEHICLES / count;
         let is_shown = |k: &usize| count <= MAX_VEHICLES || alarm[*k] || share(*k) < share(*k + 1);
-        let hull_colour = |k: usize| if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
+        let hull_colour = |k: usize| if alarm[k] { theme.pick(ALARM) } else { theme.vehicle_among(k, count) };
         let attitudes = if count <= MAX_QUADROTORS { attitudes_of(sample) } else { Vec::new() };
         let attitude = |k: usize| attitudes.get(k).copied().flatten();
-        let quadrotors = (0..count).filter_map(|k| {
-            let rotors = timeline.rotors.unwrap_or_else(|| Rotors::within(timeline.radius_m[k]));
-            Some(quadrotor(&rotors, row(positions_m, k), attitude(k)?, hull_colour(k)))
-        });
-        let quadrotors: Vec<_> = quadrotors.collect();
-        let hulls = (0..count).filter(is_shown).filter(|&k| attitude(k).is_none());
-        let hulls = hulls.map(|k| sphere(positions_m, k, timeline.radius_m[k], hull_colour(k)));
-        let bodies = quadrotors.iter().map(|quadrotor| quadrotor.body);
-        let rotors = quadrotors.iter().flat_map(|quadrotor| quadrotor.rotors);
-        let solids = obstacles().filter_map(|obstacle| match obstacle.shape {
-            Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
-            _ => None,
-        });
-        let shells = (0..count).filter(is_shown).map(|k| {
-            let colour = if alarm[k] { theme.alarm() } else { theme.shell() };
-            let mut shell = sphere(positions_m, k, timeline.delta_m.unwrap_or(0.0) / 2.0, colour.at(0.15));
-            shell.size.iter_mut().for_each(|size| size.z *= timeline.log.metric().ratio());
-            shell
-        });
-        let mut lines = LinePrimitive {
-            r#type: LineType::LineList.into(),
-            pose: Some(pose(nalgebra::Vector3::zeros(), UnitQuaternion::identity())),
-            thickness: EDGE_M,
-            ..LinePrimitive::default()
+        let mut entity = SceneEntity {
+            timestamp: Some(timestamp(time_s)),
+            frame_id: "world".to_owned(),
+            id: "swarm".to_owned(),
+            cubes: obstacles().filter_map(cube).collect(),
+            cylinders: obstacles().filter_map(cylinder).collect(),
+            lines: self.edges(positions_m, time_s).into_iter().collect(),
+            ..SceneEntity::default()
         };
-        let few_edges = timeline.plan.iter().filter(|plan| plan.graph.edge_count() <= MAX_EDGES);
-        for (plan, (i, j)) in few_edges.flat_map(|plan| plan.graph.edges().map(move |edge| (plan, edge))) {
-            let tension = plan.tension(Pair::new(i, j), separation(positions_m, i, j), time_s);
-            for place in [i, j].map(|k| row(positions_m, k)) {
-                lines.points.push(Point3 { x: place.x, y: place.y, z: place.z });
-                lines.colors.push(colour(theme.tension(tension).at(0.8)));
+        for k in (0..count).filter(is_shown) {
+            let (place_m, radius_m) = (row(positions_m, k), timeline.radius_m[k]);
+            match attitude(k) {
+                Some(attitude) => {
+                    let rotors = timeline.rotors.unwrap_or_else(|| Rotors::within(radius_m));
+                    add_quadrotor(&mut entity, &rotors, place_m, attitude, hull_colour(k));
+                }
+                None => entity.spheres.push(ball(place_m, radius_m, hull_colour(k))),
             }
         }
-        SceneUpdate {
-            deletions: Vec::new(),
-            entities: vec![SceneEntity {
-                timestamp: Some(timestamp(time_s)),
-                frame_id: "world".to_owned(),
-                id: "swarm".to_owned(),
-                spheres: bodies.chain(hulls).chain(shells).chain(solids).collect(),
-                cubes: obstacles().filter_map(cube).collect(),
-                cylinders: obstacles().filter_map(cylinder).chain(rotors).collect(),
-                lines: Some(lines)
-                    .filter(|lines| !lines.points.is_empty())
-                    .into_iter()
-                    .chain(quadrotors.iter().map(|quadrotor| quadrotor.arms.clone()))
-                    .collect(),
-                ..SceneEntity::default()
-            }],
+        entity.spheres.extend((0..count).filter(is_shown).map(|k| {
+            let colour = theme.pick(if alarm[k] { ALARM } else { SHELL });
+            let mut shell = ball(row(positions_m, k), timeline.delta_m.unwrap_or(0.0) / 2.0, colour.at(0.15));
+            shell.size.iter_mut().for_each(|size| size.z *= timeline.log.metric().ratio());
+            shell
+        }));
+        entity.spheres.extend(obstacles().filter_map(|obstacle| match obstacle.shape {
+            Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.pick(OBSTACLE))),
+            _ => None,
+        }));
+        SceneUpdate { deletions: Vec::new(), entities: vec![entity] }
+    }
+
+    /// Returns the edges in the colour of their tension, unless there are none or too many.
+    fn edges(&self, positions_m: &Rows, time_s: f64) -> Option<LinePrimitive> {
+        let plan = self.timeline.plan.as_ref().filter(|plan| (1..=MAX_EDGES).contains(&plan.graph.edge_count()))?;
+        let (mut points, mut colors) = (Vec::new(), Vec::new());
+        for (i, j) in plan.graph.edges() {
+            let tension = plan.tension(Pair::new(i, j), separation(positions_m, i, j), time_s);
+            for place in [i, j].map(|k| row(positions_m, k)) {
+                points.push(Point3 { x: place.x, y: place.y, z: place.z });
+                colors.push(colour(Theme::Dark.tension(tension).at(0.8)));
+            }
         }
+        let pose = Some(pose(nalgebra::Vector3::zeros(), UnitQuaternion::identity()));
+        let r#type = LineType::LineList.into();
+        Some(LinePrimitive { r#type, pose, thickness: EDGE_M, points, colors, ..LinePrimitive::default() })
     }
 }
 
@@ -152,10 +149,6 @@ impl ExtraTopic for FoxgloveScene {
     }
 }
 
-fn sphere(positions_m: &Rows, k: usize, radius_m: f64, shown: Colour) -> SpherePrimitive {
-    ball(row(positions_m, k), radius_m, shown)
-}
-
 /// Returns the cube of a box, or a plate for a half-space.
 fn cube(obstacle: &Obstacle) -> Option<CubePrimitive> {
     let (size, turn) = match obstacle.shape {
@@ -168,7 +161,7 @@ fn cube(obstacle: &Obstacle) -> Option<CubePrimitive> {
     Some(CubePrimitive {
         pose: Some(pose(obstacle.place_m, turn)),
         size: Some(Vector3 { x: size.x, y: size.y, z: size.z }),
-        color: Some(colour(Theme::Dark.obstacle())),
+        color: Some(colour(Theme::Dark.pick(OBSTACLE))),
     })
 }
 
@@ -181,7 +174,7 @@ fn cylinder(obstacle: &Obstacle) -> Option<CylinderPrimitive> {
         size: Some(Vector3 { x: side, y: side, z: (to_m - from_m).norm() + side }),
         bottom_scale: 1.0,
         top_scale: 1.0,
-        color: Some(colour(Theme::Dark.obstacle())),
+        color: Some(colour(Theme::Dark.pick(OBSTACLE))),
     })
 }
 
@@ -198,47 +191,37 @@ fn timestamp(time_s: f64) -> Timestamp {
     Timestamp::new_checked(seconds, nanoseconds).unwrap_or(Timestamp::MAX)
 }
 
-/// Lengths relative to the arm: radius of the body, width of an arm, reach of the mark ahead, height of a rotor.
-const BODY: f64 = 0.3;
-const ARM: f64 = 0.11;
-const AHEAD: f64 = 0.72;
+/// Thickness of a rotor relative to the arm.
 const ROTOR: f64 = 0.04;
 /// Opacity of a rotor.
 const OPACITY: f32 = 0.5;
 
-/// Quadrotor with its attitude: body, rotors, and arms with a mark ahead.
-struct QuadrotorParts {
-    body: SpherePrimitive,
-    rotors: [CylinderPrimitive; 4],
-    arms: LinePrimitive,
-}
-
-/// Returns the parts of a quadrotor at a position \[m\].
-fn quadrotor(
+/// Adds a quadrotor at a position \[m\]: body, rotors, and arms with a mark ahead.
+fn add_quadrotor(
+    entity: &mut SceneEntity,
     shape: &Rotors,
     place_m: nalgebra::Vector3<f64>,
     attitude: UnitQuaternion<f64>,
     shown: Colour,
-) -> QuadrotorParts {
+) {
     let (arm_m, side) = (shape.arm_m(), 2.0 * shape.radius_m);
-    let rotors = shape.places_m(0.0).map(|rotor_m| CylinderPrimitive {
+    entity.spheres.push(ball(place_m, Rotors::BODY * arm_m, shown));
+    entity.cylinders.extend(shape.places_m().map(|rotor_m| CylinderPrimitive {
         pose: Some(pose(place_m + attitude * rotor_m, attitude)),
         size: Some(Vector3 { x: side, y: side, z: ROTOR * arm_m }),
         bottom_scale: 1.0,
         top_scale: 1.0,
         color: Some(colour(shown.at(OPACITY))),
-    });
-    let ahead_m = nalgebra::Vector3::x() * (AHEAD * arm_m);
-    let ends = shape.places_m(0.0).into_iter().chain([ahead_m]);
-    let arms = LinePrimitive {
+    }));
+    let ends = shape.places_m().into_iter().chain([shape.nose_m()]);
+    entity.lines.push(LinePrimitive {
         r#type: LineType::LineList.into(),
         pose: Some(pose(place_m, attitude)),
-        thickness: ARM * arm_m,
+        thickness: Rotors::WIDTH * arm_m,
         points: ends.flat_map(|end| [Point3::default(), Point3 { x: end.x, y: end.y, z: end.z }]).collect(),
         color: Some(colour(shown)),
         ..LinePrimitive::default()
-    };
-    QuadrotorParts { body: ball(place_m, BODY * arm_m, shown), rotors, arms }
+    });
 }
 
 /// Returns the pose at a position with a rotation.
@@ -380,7 +363,7 @@ mod tests {
             let bytes = message(scene, time_s, &swarm).expect("a message");
             let entity = SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities.remove(0);
             assert!(entity.lines[0].pose.is_some());
-            [0, 2, 4].map(|k| entity.spheres[k].color == Some(colour(Theme::Dark.alarm())))
+            [0, 2, 4].map(|k| entity.spheres[k].color == Some(colour(Theme::Dark.pick(ALARM))))
         };
         assert_eq!(red(&mut scene, 0.0), [false; 3], "no violation was reported");
         let (pair, time_s, min_m) = (Pair::new(0, 2), 0.5, 1.9);

@@ -1,5 +1,7 @@
 //! Pictures in memory: PNG encoding, halving, and contact sheets.
 
+use std::ops::Range;
+
 use super::error::RenderError;
 
 /// Picture in sRGB: rows from the top, pixels from the left, with red, green, blue and opacity.
@@ -109,6 +111,18 @@ pub fn contact_sheet(pictures: &[Picture], columns: u32) -> Result<Picture, Rend
         }
     }
     Ok(Picture { size_px, rgba })
+}
+
+/// Returns the pixels whose centres may be between two coordinates.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the casts saturate")]
+pub(super) fn pixels(from: f32, to: f32, side: u32) -> Range<usize> {
+    (from.floor().max(0.0) as usize).min(side as usize)..(to.ceil().max(0.0) as usize).min(side as usize)
+}
+
+/// Returns a channel from 0 to 255, rounded.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+pub(super) fn byte(value: f32) -> u8 {
+    value.round() as u8
 }
 
 #[cfg(test)]

@@ -24,40 +24,10 @@ const TEXT_SCALE: f32 = 1.75;
 
 /// Draws pictures of runs with a graphics adapter.
 pub struct RunPictures {
-    adapter: String,
-    /// Whether snapshots are taken. The scene is recorded in any case.
-    takes_snapshots: bool,
-}
-
-impl RunPictures {
-    /// Selects the adapter: `best`, `hardware`, `software`, or a part of its name.
-    #[must_use]
-    pub fn new(adapter: &str) -> Self {
-        Self { adapter: adapter.to_owned(), takes_snapshots: true }
-    }
-
-    /// Enables or disables snapshots.
-    #[must_use]
-    pub fn with_snapshots(self, takes_snapshots: bool) -> Self {
-        Self { takes_snapshots, ..self }
-    }
-}
-
-impl RunPictures {
-    fn snapshots(
-        &self,
-        scenario: &Scenario,
-        report: &Report,
-        log: &Arc<FlightLog>,
-    ) -> Result<Vec<Snapshot>, RenderError> {
-        let timeline = Timeline::flown(scenario, Arc::clone(log)).judged(report.answer.status);
-        if log.keyframes().is_empty() {
-            return Err(RenderError::Empty(timeline.name));
-        }
-        let mut renderer = Renderer::open(&self.adapter.as_str().into())?;
-        let view = View { theme: Theme::Light, size_px: SIZE_PX, text_scale: TEXT_SCALE, ..View::of(&timeline) };
-        snapshots_of_run(&mut renderer, &timeline, &view)
-    }
+    /// Adapter: `best`, `hardware`, `software`, or a part of its name.
+    pub adapter: String,
+    /// Whether pictures are taken. The scene is recorded in any case.
+    pub takes_snapshots: bool,
 }
 
 impl Pictures for RunPictures {
@@ -70,7 +40,8 @@ impl Pictures for RunPictures {
         folder: &Path,
         monitor: &dyn Monitor,
     ) -> Result<Vec<NamedPicture>, Failure> {
-        let snapshots = if self.takes_snapshots { self.snapshots(scenario, report, log) } else { Ok(Vec::new()) };
+        let timeline = Timeline::flown(scenario, Arc::clone(log)).judged(report.answer.status);
+        let snapshots = if self.takes_snapshots { snapshots(&self.adapter, timeline) } else { Ok(Vec::new()) };
         let snapshots = snapshots.unwrap_or_else(|error| {
             monitor.warn(&format!("no pictures were taken: {}", Failure::from(error).in_words()));
             Vec::new()
@@ -102,20 +73,15 @@ impl Pictures for RunPictures {
     }
 }
 
-/// Picture with its name and description.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Snapshot {
-    /// File name without `.png`.
-    pub name: String,
-    /// Description, one sentence.
-    pub description: String,
-    /// Picture.
-    pub picture: Picture,
+/// Picture with its file name without `.png`, and its description in a sentence.
+struct Snapshot {
+    name: String,
+    description: String,
+    picture: Picture,
 }
 
-/// Returns the names of all pictures that [`snapshots_of_run`] can take.
-#[must_use]
-pub fn snapshot_names() -> Vec<String> {
+/// Returns the names of all pictures that a run can have.
+fn snapshot_names() -> Vec<String> {
     let numbered = ["leg", "violation"].into_iter().flat_map(|name| (1..=PICTURED).map(move |k| format!("{name}-{k}")));
     ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(numbered).collect()
 }
@@ -124,16 +90,14 @@ pub fn snapshot_names() -> Vec<String> {
 type CameraOf<'a> = dyn Fn(&Frame) -> Result<Camera, RenderError> + 'a;
 
 /// Draws the start, the closest approach, the ends of the first ten legs, the end, the first violation of an obstacle's
-/// clearance, and the first ten violations of two vehicles. Returns no picture for a flight without samples.
-///
-/// # Errors
-/// [`RenderError`] if the adapter fails.
-pub fn snapshots_of_run(
-    renderer: &mut Renderer,
-    timeline: &Timeline,
-    view: &View,
-) -> Result<Vec<Snapshot>, RenderError> {
-    let extent = Extent::of(timeline);
+/// clearance, and the first ten violations of two vehicles.
+fn snapshots(adapter: &str, timeline: Timeline) -> Result<Vec<Snapshot>, RenderError> {
+    if timeline.log.keyframes().is_empty() {
+        return Err(RenderError::Empty(timeline.name));
+    }
+    let mut renderer = Renderer::open(&adapter.into())?;
+    let (timeline, extent) = (&timeline, Extent::of(&timeline));
+    let view = &View { theme: Theme::Light, size_px: SIZE_PX, text_scale: TEXT_SCALE, ..View::of(timeline) };
     let mut snapshots = Vec::new();
     let mut shoot = |name: &str, description: String, time_s: f64, camera: &CameraOf<'_>| {
         let Some(frame) = timeline.log.at(time_s) else { return Ok(()) };

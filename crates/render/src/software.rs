@@ -1,58 +1,40 @@
 //! Rendering of scenes on the processor, for machines without a graphics adapter.
 //!
-//! The pictures follow `shaders/scene.wgsl`: four samples per pixel, blending in linear light, text on top. Bands of
-//! rows are drawn in parallel.
+//! The pictures follow `shaders/scene.wgsl`: four samples per pixel, blending in linear light. Bands of rows are drawn in
+//! parallel.
 
 use std::ops::Range;
 
-use egui::epaint::{ImageData, Mesh, Primitive, Vertex};
-use egui::{Color32, Pos2, Rect, TextureId, Vec2};
 use nalgebra::{Vector2, Vector3};
 use rayon::iter::{IndexedParallelIterator as _, ParallelIterator as _};
 use rayon::slice::ParallelSliceMut as _;
 
-use super::error::RenderError;
-use super::gpu::paint;
-use super::picture::Picture;
+use super::error::{RenderError, check_size};
+use super::overlay::Overlay;
+use super::picture::{Picture, byte, pixels};
 use super::scene::{Ball, Camera, Colour, Disc, Face, Lens, Line, Scene};
+use tautline_report::drawing::LIGHT;
 
 /// Largest side of a picture \[pixels\].
 const LARGEST_PX: u32 = 16_384;
-/// Largest side of the texture of letters \[pixels\].
-const LETTERS_PX: usize = 2048;
 /// Rows of a band.
 const BAND: usize = 16;
 /// Positions of the samples of a pixel.
 const SAMPLES: [[f32; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]];
-/// Light from above the camera's left shoulder, as in shaders/scene.wgsl.
-const LIGHT: [f32; 3] = [-0.408, 0.577, 0.707];
-const AMBIENT: f32 = 0.38;
-const GLOSS: f32 = 0.16;
-const SHININESS: i32 = 48;
+/// Light on a side that faces away from the light, share of the reflected light, and its exponent.
+pub(crate) const AMBIENT: f32 = 0.38;
+pub(crate) const GLOSS: f32 = 0.16;
+pub(crate) const SHININESS: u8 = 48;
 
 /// Renderer without an adapter.
 #[derive(Default)]
-pub(crate) struct Software {
-    context: egui::Context,
-    letters: Letters,
-}
-
-/// Texture of the letters.
-#[derive(Default)]
-struct Letters {
-    size: [usize; 2],
-    pixels: Vec<Color32>,
-}
+pub(crate) struct Software(Overlay);
 
 impl Software {
     pub(crate) const NAME: &'static str = "the program itself, without a graphics adapter";
 
-    pub(crate) fn check_size([width, height]: [u32; 2]) -> Result<(), RenderError> {
-        if [width, height].into_iter().all(|side| (1..=LARGEST_PX).contains(&side)) {
-            return Ok(());
-        }
-        let cannot = format!("a picture of {width} x {height} pixels cannot be drawn");
-        Err(RenderError::PictureSize(format!("{cannot}: the program draws from 1 to {LARGEST_PX} pixels a side")))
+    pub(crate) fn check_size(size_px: [u32; 2]) -> Result<(), RenderError> {
+        check_size(size_px, LARGEST_PX, "the program")
     }
 
     pub(crate) fn paint(&mut self, scene: &Scene) -> Result<Picture, RenderError> {
@@ -83,120 +65,9 @@ impl Software {
             band.resolve(rows);
         });
         let mut picture = Picture { size_px, rgba };
-        self.write(scene, &mut picture);
+        self.0.draw(&scene.annotations, &mut picture);
         Ok(picture)
     }
-
-    /// Draws the annotations.
-    fn write(&mut self, scene: &Scene, picture: &mut Picture) {
-        let [width, height] = picture.size_px.map(|side| side as f32);
-        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(width, height));
-        let input = egui::RawInput {
-            screen_rect: Some(screen),
-            max_texture_side: Some(LETTERS_PX),
-            time: Some(0.0),
-            ..egui::RawInput::default()
-        };
-        let mut output = self.context.run_pass(input, |context| {
-            let painter = context.layer_painter(egui::LayerId::background()).with_clip_rect(screen);
-            paint(&painter, &scene.annotations, Vec2::ZERO, 1.0);
-        });
-        for (id, deltas) in &output.textures_delta.set {
-            for delta in deltas.iter().filter(|_| *id == TextureId::default()) {
-                let ImageData::Color(image) = &delta.image;
-                self.letters.update(delta.pos, image.size, &image.pixels);
-            }
-        }
-        let shapes = std::mem::take(&mut output.shapes);
-        for clipped in self.context.tessellate(shapes, 1.0) {
-            if let Primitive::Mesh(mesh) = &clipped.primitive {
-                self.letters.mesh(mesh, clipped.clip_rect, picture);
-            }
-        }
-        output.textures_delta.clear();
-    }
-}
-
-impl Letters {
-    /// Replaces the texture, or the part of it at a position.
-    fn update(&mut self, origin: Option<[usize; 2]>, [width, height]: [usize; 2], pixels: &[Color32]) {
-        let Some([left, top]) = origin else {
-            (self.size, self.pixels) = ([width, height], pixels.to_vec());
-            return;
-        };
-        for (y, row) in pixels.chunks_exact(width.max(1)).enumerate().take(height) {
-            let from = (top + y) * self.size[0] + left;
-            if let Some(old) = self.pixels.get_mut(from..from + width) {
-                old.copy_from_slice(row);
-            }
-        }
-    }
-
-    /// Returns the nearest texel, from 0 to 1 per channel. Letters are drawn at whole pixels.
-    fn texel(&self, u: f32, v: f32) -> [f32; 4] {
-        let index_at = |part: f32, side: usize| {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
-            let index = (part * side as f32) as usize;
-            index.min(side.saturating_sub(1))
-        };
-        let texel = self.pixels.get(index_at(v, self.size[1]) * self.size[0] + index_at(u, self.size[0]));
-        texel.map_or([1.0; 4], |texel| texel.to_array().map(|channel| f32::from(channel) / 255.0))
-    }
-
-    fn mesh(&self, mesh: &Mesh, clip: Rect, picture: &mut Picture) {
-        for corners in mesh.indices.chunks_exact(3) {
-            let corner = |k: usize| mesh.vertices.get(corners[k] as usize).copied();
-            if let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) {
-                self.triangle([a, b, c], clip, picture);
-            }
-        }
-    }
-
-    /// Draws a triangle with premultiplied colours.
-    fn triangle(&self, [a, b, c]: [Vertex; 3], clip: Rect, picture: &mut Picture) {
-        let cross = |p: Pos2, q: Pos2, r: Pos2| (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
-        let area = cross(a.pos, b.pos, c.pos);
-        if area == 0.0 {
-            return;
-        }
-        let [b, c] = if area > 0.0 { [b, c] } else { [c, b] };
-        let area = area.abs();
-        let edges = [[b.pos, c.pos], [c.pos, a.pos], [a.pos, b.pos]];
-        // A pixel on a common edge belongs to one triangle only.
-        let owns = edges.map(|[p, q]| q.y < p.y || q.y == p.y && q.x > p.x);
-        let bounds = Rect::from_points(&[a.pos, b.pos, c.pos]).intersect(clip);
-        let [width, height] = picture.size_px;
-        for y in pixels(bounds.top(), bounds.bottom(), height) {
-            for x in pixels(bounds.left(), bounds.right(), width) {
-                let pixel = Pos2::new(x as f32 + 0.5, y as f32 + 0.5);
-                let weights = edges.map(|[p, q]| cross(p, q, pixel));
-                if !clip.contains(pixel) || weights.iter().zip(owns).any(|(&w, owns)| w < 0.0 || w == 0.0 && !owns) {
-                    continue;
-                }
-                let [wa, wb, wc] = weights.map(|weight| weight / area);
-                let mix = |value_of: &dyn Fn(&Vertex) -> f32| wa * value_of(&a) + wb * value_of(&b) + wc * value_of(&c);
-                let texel = self.texel(mix(&|v| v.uv.x), mix(&|v| v.uv.y));
-                let from = (y * width as usize + x) * 4;
-                let source = [0, 1, 2, 3].map(|k| mix(&|v| f32::from(v.color.to_array()[k])) * texel[k]);
-                for k in 0..3 {
-                    let under = f32::from(picture.rgba[from + k]);
-                    picture.rgba[from + k] = byte(source[k] + under * (1.0 - source[3] / 255.0));
-                }
-            }
-        }
-    }
-}
-
-/// Returns the pixels whose centres may be between two coordinates.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the casts saturate")]
-fn pixels(from: f32, to: f32, side: u32) -> Range<usize> {
-    (from.floor().max(0.0) as usize).min(side as usize)..(to.ceil().max(0.0) as usize).min(side as usize)
-}
-
-fn byte(value: f32) -> u8 {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
-    let byte = (value + 0.5) as u8;
-    byte
 }
 
 type Vec3 = Vector3<f32>;
@@ -380,12 +251,12 @@ impl<'a> Band<'a> {
         let (view, centre) = (self.view, self.view.at(ball.centre_m));
         let Some(around) = view.around(centre, ball.radius_m) else { return };
         let [red, green, blue, _] = ball.colour.linear();
-        let light = Vec3::from(LIGHT);
+        let light = single(LIGHT.into());
         self.visit(around, |band, sample, [x, y]| {
             let Some(hit) = view.hit(view.ray(x, y), centre, ball.radius_m, 1.0) else { return };
             if hit.depth_m < band.depths_m[sample] {
                 let lit = AMBIENT + (1.0 - AMBIENT) * hit.normal.dot(&light).max(0.0);
-                let gloss = GLOSS * hit.normal.dot(&(light + hit.view).normalize()).max(0.0).powi(SHININESS);
+                let gloss = GLOSS * hit.normal.dot(&(light + hit.view).normalize()).max(0.0).powi(SHININESS.into());
                 band.depths_m[sample] = hit.depth_m;
                 band.colours[sample] = [red, green, blue].map(|part| part * lit + gloss);
             }

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::DeviceType;
 
-use crate::error::RenderError;
+use crate::error::{RenderError, check_size};
 
 /// Choice of the adapter.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -106,13 +106,8 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn check_size(&self, [width, height]: [u32; 2]) -> Result<(), RenderError> {
-        let (largest, adapter) = (self.largest_px, &self.name);
-        if (1..=largest).contains(&width) && (1..=largest).contains(&height) {
-            return Ok(());
-        }
-        let cannot = format!("a picture of {width} x {height} pixels cannot be drawn");
-        Err(RenderError::PictureSize(format!("{cannot}: {adapter} draws from 1 to {largest} pixels a side")))
+    pub(crate) fn check_size(&self, size_px: [u32; 2]) -> Result<(), RenderError> {
+        check_size(size_px, self.largest_px, &self.name)
     }
 
     /// Checks that the driver has not failed since the last call.

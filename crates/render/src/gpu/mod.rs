@@ -2,12 +2,11 @@
 //!
 //! A ball is a flat quad. Every pixel computes its point of the sphere, and every sample of a pixel its own edge. Balls
 //! are round at any size and cost only the pixels that they cover. Pictures use four samples per pixel and blending in
-//! linear light; egui draws text and legends on top. A frame is uploaded once and drawn in two passes.
+//! linear light. The processor draws text and legends over the finished picture.
 //!
 //! The same scene gives the same bytes on the same adapter and driver.
 
 mod adapter;
-mod overlay;
 mod pipelines;
 
 pub use adapter::{AdapterChoice, adapters};
@@ -17,14 +16,13 @@ pub(crate) use adapter::lost;
 #[cfg(feature = "window")]
 pub(crate) use adapter::unusable;
 pub(crate) use adapter::{Gpu, instance};
-pub(crate) use overlay::paint;
 
 use super::error::RenderError;
+use super::overlay::Overlay;
 use super::picture::Picture;
 use super::scene::{Extent, Scene, View};
 use super::software::Software;
 use super::timeline::Timeline;
-use overlay::Overlay;
 use pipelines::Pipelines;
 
 /// Renderer of scenes to pictures.
@@ -105,19 +103,20 @@ pub(crate) struct GpuRenderer {
 
 impl GpuRenderer {
     pub(crate) fn on(gpu: Gpu) -> Self {
-        let (pipelines, overlay) = (Pipelines::new(&gpu.device), Overlay::new(&gpu.device));
+        let (pipelines, overlay) = (Pipelines::new(&gpu.device), Overlay::default());
         Self { gpu, pipelines, overlay, target: None }
     }
 
     pub(crate) fn paint(&mut self, scene: &Scene) -> Result<Picture, RenderError> {
         let gpu = self.gpu.clone();
-        let picture = self.draw(scene, true)?.read(&gpu)?;
+        let mut picture = self.draw(scene)?.read(&gpu)?;
+        self.overlay.draw(&scene.annotations, &mut picture);
         gpu.check()?;
         Ok(picture)
     }
 
-    /// Draws a scene into a texture, with or without its annotations.
-    pub(crate) fn draw(&mut self, scene: &Scene, with_annotations: bool) -> Result<&Target, RenderError> {
+    /// Draws a scene without its annotations into a texture.
+    pub(crate) fn draw(&mut self, scene: &Scene) -> Result<&Target, RenderError> {
         let size_px = scene.camera.size_px;
         self.gpu.check_size(size_px)?;
         // A target of another size is freed first.
@@ -128,9 +127,6 @@ impl GpuRenderer {
         };
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.pipelines.draw(&self.gpu, &mut encoder, target, scene);
-        if with_annotations {
-            self.overlay.draw(&self.gpu, &mut encoder, target, &scene.annotations);
-        }
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu.check()?;
         Ok(target)
@@ -141,8 +137,8 @@ impl GpuRenderer {
 const SAMPLES: u32 = 4;
 /// Texture format for blending in linear light.
 const LIGHT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
-/// Texture format of the same picture for text.
-const WORDS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// Texture format of the same picture for the window.
+const BYTES_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// Textures for pictures of one size.
@@ -152,7 +148,8 @@ pub(crate) struct Target {
     /// View for blending in linear light.
     pub(super) light_view: wgpu::TextureView,
     /// View of the bytes as they are.
-    pub(crate) words_view: wgpu::TextureView,
+    #[cfg(feature = "window")]
+    pub(crate) bytes_view: wgpu::TextureView,
     pub(super) samples_view: wgpu::TextureView,
     pub(super) depth_view: wgpu::TextureView,
 }
@@ -174,7 +171,7 @@ impl Target {
         };
         let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let usage = attachment | wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::TEXTURE_BINDING;
-        let texture = make("picture", LIGHT_FORMAT, 1, usage, &[WORDS_FORMAT]);
+        let texture = make("picture", LIGHT_FORMAT, 1, usage, &[BYTES_FORMAT]);
         let samples = make("samples", LIGHT_FORMAT, SAMPLES, attachment, &[]);
         let depth = make("depth", DEPTH_FORMAT, SAMPLES, attachment, &[]);
         let view = |texture: &wgpu::Texture, format| {
@@ -183,7 +180,8 @@ impl Target {
         let target = Self {
             size_px,
             light_view: view(&texture, None),
-            words_view: view(&texture, Some(WORDS_FORMAT)),
+            #[cfg(feature = "window")]
+            bytes_view: view(&texture, Some(BYTES_FORMAT)),
             samples_view: view(&samples, None),
             depth_view: view(&depth, None),
             texture,

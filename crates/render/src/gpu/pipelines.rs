@@ -7,6 +7,10 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 use super::adapter::Gpu;
 use super::{DEPTH_FORMAT, LIGHT_FORMAT, SAMPLES, Target};
 use crate::scene::{Ball, Disc, Face, Lens, Line, Scene};
+use crate::software::{AMBIENT, GLOSS, SHININESS};
+use tautline_report::drawing::LIGHT;
+
+const SHADERS: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/", env!("TAUTLINE_SHADERS"), "/scene.wgsl"));
 
 /// Uniform `Camera` of shaders/scene.wgsl: right, up, back, eye, lens and range.
 type CameraUniform = [[f32; 4]; 6];
@@ -65,12 +69,13 @@ impl Pipelines {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let shaders = device.create_shader_module(wgpu::include_wgsl!(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/",
-            env!("TAUTLINE_SHADERS"),
-            "/scene.wgsl"
-        )));
+        let [x, y, z] = LIGHT;
+        let source = format!(
+            "const LIGHT = vec3({x:?}, {y:?}, {z:?});\nconst AMBIENT = {AMBIENT:?};\nconst GLOSS = {GLOSS:?};\n\
+             const SHININESS = {SHININESS}.0;\n{SHADERS}"
+        );
+        let source = wgpu::ShaderSource::Wgsl(source.into());
+        let shaders = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("scene"), source });
         let call = |corner, pixel, attributes: &[_], bytes: usize, writes_depth| {
             let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(pixel),

@@ -5,9 +5,8 @@ use std::str::FromStr;
 use nalgebra::Vector3;
 
 use crate::error::RenderError;
+use tautline_report::drawing::TAN_HALF_VIEW;
 
-/// Tangent of half the vertical angle of view, which is 35 degrees.
-const TAN_HALF_VIEW: f64 = 0.315_298_788_878_983_7;
 /// Smallest distance of a camera from its target \[m\].
 const MIN_DISTANCE_M: f64 = 1e-3;
 /// Margin beside the content, relative to half the width, and above and below the texts, relative to half the height.
@@ -194,15 +193,15 @@ impl Camera {
         let across = half * aspect(size_px);
         let (room, margins) = ([across, across, half, half], area.margins());
         let slopes = [0, 1, 2, 3].map(|side| room[side] * (1.0 - margins[side]));
+        let lengths = slopes.map(|slope| slope.hypot(1.0));
         // Required reach of each side of the view, and the range along the line of sight.
         let mut reaches = [f64::NEG_INFINITY; 4];
         let (mut nearest, mut farthest) = (f64::NEG_INFINITY, f64::INFINITY);
         for (centre, radius) in balls {
             let (x, y, ahead) = (right.dot(centre), up.dot(centre), -back.dot(centre));
             for (side, offset) in [-x, x, -y, y].into_iter().enumerate() {
-                let slope = slopes[side];
                 let reach =
-                    if is_parallel { offset + radius } else { offset + radius * slope.hypot(1.0) - ahead * slope };
+                    if is_parallel { offset + radius } else { offset + radius * lengths[side] - ahead * slopes[side] };
                 reaches[side] = reaches[side].max(reach);
             }
             (nearest, farthest) = (nearest.max(-ahead + radius), farthest.min(-ahead - radius));

@@ -9,7 +9,8 @@ use super::{Annotation, pixels};
 use tautline_audit::{Status, Violation};
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{at_least, beside_limit, exact};
-use tautline_report::replay::LIMITS;
+use tautline_report::drawing::LIMITS;
+use tautline_report::drawing::colours::{ALARM, GOOD, INK, ON_ALARM, PAPER, SHELL, SOFT_INK};
 use tautline_sim::plan::Plan;
 
 /// Largest number of pairs closer than delta whose separation is drawn; the closest pairs are chosen.
@@ -36,7 +37,7 @@ impl SceneBuilder<'_> {
         let (theme, size_px, margin) = (self.view.theme, self.view.text_px(1.0), self.view.margin_px());
         let width_px = self.view.size_px[0] as f32;
         let mut y = self.banner(labels);
-        let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
+        let (ground, room_px) = (theme.pick(PAPER).at(BACKING), 0.3 * size_px);
         let has_banner = y > margin;
         let [top_px, _] = self.bands_px();
         self.band([if has_banner { self.view.banner_px() } else { 0.0 }, top_px], has_banner, labels);
@@ -56,7 +57,7 @@ impl SceneBuilder<'_> {
         if width(large_px, &time) > free_px {
             return;
         }
-        free_px = labels.put([width_px - margin, y], [1.0, 0.0], large_px, theme.ink(), &time)[0][0] - 2.0 * margin;
+        free_px = labels.put([width_px - margin, y], [1.0, 0.0], large_px, theme.pick(INK), &time)[0][0] - 2.0 * margin;
         let below = y + 1.8 * size_px;
         let (verdicts, colour) = self.verdict();
         let verdict = verdicts.iter().find(|text| width(size_px, text) <= width_px - 2.0 * margin);
@@ -64,14 +65,14 @@ impl SceneBuilder<'_> {
         labels.insert_background(taken, bottom, ground, room_px);
         let (_, taken) = labels.placed();
         if let Some(name) = cut(&shortened(&self.timeline.name), large_px, free_px) {
-            labels.put([margin, y], [0.0, 0.0], large_px, theme.ink(), &name);
+            labels.put([margin, y], [0.0, 0.0], large_px, theme.pick(INK), &name);
             labels.insert_background(taken, bottom, ground, room_px);
         }
         y = below;
         let (_, taken) = labels.placed();
         let free_px = verdict_px.map_or(0.0, |corners_px| corners_px[0][0] - 2.0 * margin);
         if let Some(text) = self.closest_so_far().iter().find(|text| width(size_px, text) <= free_px) {
-            labels.put([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), text);
+            labels.put([margin, y], [0.0, 0.0], size_px, theme.pick(SOFT_INK), text);
             labels.insert_background(taken, bottom, ground, room_px);
         }
     }
@@ -92,60 +93,42 @@ impl SceneBuilder<'_> {
         if self.covered_areas_px().iter().any(is_inside) {
             let inset = if is_framed { FRAME_PX * self.view.unit_px() } else { 0.0 };
             let corners_px = [[inset, from_px], [width_px - inset, to_px - inset.min(to_px - from_px)]];
-            labels.draw(Annotation::Box { corners_px, colour: self.view.theme.background(), round_px: 0.0 });
+            labels.draw(Annotation::Box { corners_px, colour: self.view.theme.pick(PAPER), round_px: 0.0 });
         }
     }
 
-    /// Draws a banner for a current violation, and a frame around the picture; returns the top of the caption.
+    /// Draws a banner for a current violation, of two vehicles before one of an obstacle, and a frame around the picture;
+    /// returns the top of the caption.
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
-        let Some(&(violation, distance_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
-        let Violation { min_m, min_at_s, limit_m, .. } = violation;
-        let [pair, short] = self.pair(violation.pair);
-        let apart = if distance_m < limit_m {
-            format!("{} m apart", beside_limit(distance_m, limit_m, 3))
-        } else if min_m < limit_m {
-            format!("{} m apart at {min_at_s:.2} s", beside_limit(min_m, limit_m, 3))
+        let (long, short, count) = if let Some(&(violation, distance_m)) = self.violated.first() {
+            let Violation { min_m, min_at_s, limit_m, .. } = violation;
+            let [pair, short] = self.pair(violation.pair);
+            let apart = if distance_m < limit_m {
+                format!("{} m apart", beside_limit(distance_m, limit_m, 3))
+            } else if min_m < limit_m {
+                format!("{} m apart at {min_at_s:.2} s", beside_limit(min_m, limit_m, 3))
+            } else {
+                "too close".to_owned()
+            };
+            let long = format!("vehicles {pair} {apart}, delta {} m", exact(limit_m));
+            (long, format!("{short} {apart}"), self.violated.len())
+        } else if let Some(&[vehicle, obstacle]) = self.too_close_to_obstacle.first() {
+            let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
+            let long = format!("vehicle {vehicle} too close to {obstacle}");
+            (long, format!("{vehicle} {obstacle}"), self.too_close_to_obstacle.len())
         } else {
-            "too close".to_owned()
+            return self.view.margin_px();
         };
-        let more = match self.violated.len() - 1 {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        let texts = [
-            format!("VIOLATION  vehicles {pair} {apart}, delta {} m{more}", exact(limit_m)),
-            format!("VIOLATION {short} {apart}"),
-            "VIOLATION".to_owned(),
-        ];
-        self.draw_banner(labels, &texts)
-    }
-
-    /// Draws the banner of a vehicle too close to an obstacle, if no two vehicles are too close.
-    fn obstacle_banner(&self, labels: &mut LabelLayout) -> f32 {
-        let Some(&[vehicle, obstacle]) = self.too_close_to_obstacle.first() else { return self.view.margin_px() };
-        let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
-        let more = match self.too_close_to_obstacle.len() - 1 {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        let texts = [
-            format!("VIOLATION  vehicle {vehicle} too close to {obstacle}{more}"),
-            format!("VIOLATION {vehicle} {obstacle}"),
-            "VIOLATION".to_owned(),
-        ];
-        self.draw_banner(labels, &texts)
-    }
-
-    /// Draws the first of three texts that fits across the top, and the frame; returns the top of the caption.
-    fn draw_banner(&self, labels: &mut LabelLayout, texts: &[String; 3]) -> f32 {
-        let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
+        let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
+        let texts = [format!("VIOLATION  {long}{more}"), format!("VIOLATION {short}"), "VIOLATION".to_owned()];
+        let (alarm, size_px) = (self.view.theme.pick(ALARM), self.view.text_px(1.1));
         let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
         let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
         let bottom = self.view.banner_px();
         labels.draw(Annotation::Box { corners_px: [[0.0, 0.0], [width_px, bottom]], colour: alarm, round_px: 0.0 });
         let corners_px = [[0.0, 0.0], [width_px, height_px]];
         labels.draw(Annotation::Outline { corners_px, colour: alarm, width_px: FRAME_PX * self.view.unit_px() });
-        let ink = self.view.theme.on_alarm();
+        let ink = self.view.theme.pick(ON_ALARM);
         labels.put([width_px / 2.0, bottom / 2.0], [0.5, 0.5], size_px, ink, text);
         labels.reserve([[0.0, 0.0], [width_px, bottom]]);
         bottom + 0.6 * self.view.margin_px()
@@ -160,7 +143,7 @@ impl SceneBuilder<'_> {
     fn verdict(&self) -> (Vec<String>, Colour) {
         let (theme, now_s) = (self.view.theme, self.frame.time_s);
         if let Some(why) = self.timeline.unjudged() {
-            return (vec![format!("not judged: {why}"), "not judged".to_owned()], theme.soft_ink());
+            return (vec![format!("not judged: {why}"), "not judged".to_owned()], theme.pick(SOFT_INK));
         }
         let began: Vec<_> = self.timeline.violations_by(now_s).collect();
         let undecided_s = self.timeline.undecided_s.filter(|from_s| *from_s <= now_s);
@@ -170,11 +153,11 @@ impl SceneBuilder<'_> {
             let when = format!("violated at {:.2} s", found.from_s);
             let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
             let texts = vec![format!("{when} by {vehicle} near {obstacle}"), when, "violated".to_owned()];
-            return (texts, theme.alarm());
+            return (texts, theme.pick(ALARM));
         }
         match (began.first(), undecided_s) {
             (None, None) if self.is_end() && self.timeline.status == Some(Status::Undecided) => {
-                (vec!["undecided".to_owned()], theme.soft_ink())
+                (vec!["undecided".to_owned()], theme.pick(SOFT_INK))
             }
             (None, None) => {
                 let clear = if self.is_end() {
@@ -184,14 +167,14 @@ impl SceneBuilder<'_> {
                     "clear so far".to_owned()
                 };
                 if !self.timeline.assumes_straight {
-                    return (vec![clear], theme.good());
+                    return (vec![clear], theme.pick(GOOD));
                 }
                 let texts = [" between samples", ""].map(|between| format!("{clear}, if straight{between}"));
-                (texts.into_iter().chain(["if straight: clear".to_owned()]).collect(), theme.good())
+                (texts.into_iter().chain(["if straight: clear".to_owned()]).collect(), theme.pick(GOOD))
             }
             (None, Some(from_s)) => {
                 let since = format!("undecided from {:.2} s on", from_s.max(self.timeline.log.range_s()[0]));
-                (vec![since, "undecided".to_owned()], theme.soft_ink())
+                (vec![since, "undecided".to_owned()], theme.pick(SOFT_INK))
             }
             (Some(span), _) => {
                 let when = match began.len() {
@@ -206,7 +189,7 @@ impl SceneBuilder<'_> {
                     let hit = format!("hulls of {pair} hit at {hit_s:.2} s, {closing_m_s:.2} m/s");
                     texts.splice(..0, [format!("{}; {hit}", texts[0]), hit, "violated, hulls hit".to_owned()]);
                 }
-                (texts, theme.alarm())
+                (texts, theme.pick(ALARM))
             }
         }
     }
@@ -234,7 +217,7 @@ impl SceneBuilder<'_> {
     pub(super) fn legend(&self, labels: &mut LabelLayout) {
         let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
         let (theme, size_px, margin) = (self.view.theme, self.view.text_px(0.85), self.view.margin_px());
-        let (layers, plan, ink) = (self.view.layers, self.timeline.plan.as_ref(), self.view.theme.soft_ink());
+        let (layers, plan, ink) = (self.view.layers, self.timeline.plan.as_ref(), self.view.theme.pick(SOFT_INK));
         let (mut x, y) = (margin, height_px - margin);
         let [_, bottom_px] = self.bands_px();
         let is_framed = !self.violated.is_empty() || !self.too_close_to_obstacle.is_empty();
@@ -305,15 +288,15 @@ impl SceneBuilder<'_> {
         let shell = if is_ball { "keep-out shell, radius delta/2" } else { "keep-out shell, delta wide" };
         let shell = [shell, "keep-out shell"].into_iter().find(|shell| fits(x + size_px, shell));
         if let Some(shell) = shell.filter(|_| layers.shells && self.timeline.delta_m.is_some()) {
-            labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * stroke_px));
+            labels.draw(ring(x + arm, 1.4 * arm, theme.pick(SHELL), 1.6 * stroke_px));
             x = write(labels, x + 1.2 * size_px, shell);
         }
         let is_red = layers.trails && self.violating_s.iter().any(|violating_s| !violating_s.is_empty());
         if is_red && fits(x + 2.0 * size_px, "violation") {
-            strokes(labels, &[[[x, middle], [x + 1.4 * size_px, middle]]], theme.alarm(), 2.0 * stroke_px);
+            strokes(labels, &[[[x, middle], [x + 1.4 * size_px, middle]]], theme.pick(ALARM), 2.0 * stroke_px);
             write(labels, x + 2.0 * size_px, "violation");
         }
-        labels.insert_background(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
+        labels.insert_background(taken, bottom, theme.pick(PAPER).at(BACKING), 0.3 * size_px);
     }
 
     /// Reserves the areas of vehicles.
@@ -349,8 +332,11 @@ impl SceneBuilder<'_> {
             let Some(spot) = spot else { continue };
             let half = width(size_px, &text) / 2.0 + 0.25 * size_px;
             let corners_px = [[spot[0] - half, spot[1] - 0.68 * size_px], [spot[0] + half, spot[1] + 0.68 * size_px]];
-            let (ground, ink) =
-                if alarm { (theme.alarm(), theme.on_alarm()) } else { (theme.background().at(0.82), theme.ink()) };
+            let (ground, ink) = if alarm {
+                (theme.pick(ALARM), theme.pick(ON_ALARM))
+            } else {
+                (theme.pick(PAPER).at(0.82), theme.pick(INK))
+            };
             labels.draw(Annotation::Box { corners_px, colour: ground, round_px: 0.3 * size_px });
             labels.put(spot, [0.5, 0.5], size_px, ink, &text);
             labels.reserve(corners_px);
@@ -400,12 +386,12 @@ impl SceneBuilder<'_> {
                 pixels([projection.at_px[0], projection.at_px[1], self.timeline.radius_m[k] * projection.px_per_m]);
             let fitting = (1.5 * radius).min(1.7 * radius / width(1.0, &name).max(0.4)).min(size_px);
             if fitting >= 8.0 && !is_hidden {
-                let (at_px, anchor, colour) = ([x, y], [0.5, 0.5], theme.background());
+                let (at_px, anchor, colour) = ([x, y], [0.5, 0.5], theme.pick(PAPER));
                 labels.draw(Annotation::Words { at_px, anchor, size_px: fitting, colour, text: name });
                 continue;
             }
             let offset = f64::from(radius.max(self.view.text_px(LEAST_ROOM)) + 0.2 * size_px);
-            let colour = if self.alarmed[k] { theme.alarm() } else { self.colour(k).at(strength) };
+            let colour = if self.alarmed[k] { theme.pick(ALARM) } else { self.colour(k).at(strength) };
             // First free position of: above right, above left, below right, below left. Names of the closest pair are
             // farther away if there is no room near by.
             let distances = if is_urgent { [1.0, 2.0, 3.5].as_slice() } else { &[1.0] };

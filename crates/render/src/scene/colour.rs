@@ -2,7 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use tautline_report::replay::LIMITS;
+use crate::picture::byte;
+use tautline_report::drawing::LIMITS;
+use tautline_report::drawing::colours::{LIGHTS, LINKS, QUANTITIES, ThemeColour, VEHICLES, mixed};
 
 /// Colour in sRGB with straight alpha, 8 bits per channel.
 #[repr(C)]
@@ -51,12 +53,6 @@ impl Colour {
     }
 }
 
-fn byte(value: f32) -> u8 {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
-    let byte = value.round() as u8;
-    byte
-}
-
 /// Set of colours for a whole picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Theme {
@@ -87,53 +83,22 @@ impl Colouring {
         [("vehicle", Self::Vehicle), ("speed", Self::Speed), ("clearance", Self::Clearance), ("lights", Self::Lights)];
 }
 
-/// Colours of a quantity from small to large.
-const RAMP_ON_LIGHT: [u32; 4] = [0x2A_4C_C8, 0x8F_2F_B5, 0xC8_3B_6B, 0xC2_5A_00];
-const RAMP_ON_DARK: [u32; 4] = [0x5B_8D_EF, 0xB9_7A_E0, 0xF0_72_8F, 0xFF_C2_3D];
-/// Colours of lights from the left to the right of a swarm, and of the sky.
-const LIGHTS: [u32; 4] = [0xFF_C2_3D, 0x6F_E3_9A, 0x4F_B8_FF, 0xB0_94_FF];
-const NIGHT: Colour = Colour::hex(0x06_0A_18);
-
-/// Colours of vehicles in order, as in the charts, from Paul Tol's colour-blind safe schemes (technical note
-/// SRON/EPS/TN/09-002, issue 3.2). The dark theme has the scheme "light" without grey. The light theme has "muted".
-/// There the light blue of "medium-contrast" replaces cyan and sand, and teal is darker, for a contrast of 3 on white.
-const ON_LIGHT: [u32; 8] =
-    [0x33_22_88, 0xCC_66_77, 0x3F_9E_8E, 0xAA_44_99, 0x99_99_33, 0x66_99_CC, 0x11_77_33, 0x88_22_55];
-const ON_DARK: [u32; 8] =
-    [0x77_AA_DD, 0xEE_88_66, 0x44_BB_99, 0xFF_AA_BB, 0xEE_DD_88, 0x99_DD_FF, 0xBB_CC_33, 0xAA_AA_00];
-
 impl Theme {
     /// All themes with their names.
     pub const ALL: [(&'static str, Self); 2] = [("dark", Self::Dark), ("light", Self::Light)];
 
-    fn pick(self, dark: u32, light: u32) -> Colour {
-        Colour::hex(if self == Self::Dark { dark } else { light })
+    fn rgb(self, colour: ThemeColour) -> u32 {
+        if self == Self::Dark { colour.dark } else { colour.light }
     }
 
-    /// Background.
-    pub(crate) fn background(self) -> Colour {
-        self.pick(0x14_19_1F, 0xFF_FF_FF)
-    }
-
-    /// Text.
-    pub(crate) fn ink(self) -> Colour {
-        self.pick(0xE6_EA_EF, 0x1B_1F_24)
-    }
-
-    /// Secondary text.
-    pub(crate) fn soft_ink(self) -> Colour {
-        self.pick(0x9A_A4_AF, 0x57_60_6A)
-    }
-
-    /// Lines on the ground.
-    pub(crate) fn grid(self) -> Colour {
-        self.pick(0x31_3A_44, 0xD5_DA_E0)
+    /// Returns the colour in this theme.
+    pub(crate) fn pick(self, colour: ThemeColour) -> Colour {
+        Colour::hex(self.rgb(colour))
     }
 
     /// Returns the colour of vehicle `k`; the colours repeat.
     pub(crate) fn vehicle(self, k: usize) -> Colour {
-        let palette = if self == Self::Dark { ON_DARK } else { ON_LIGHT };
-        Colour::hex(palette[k % palette.len()])
+        self.pick(VEHICLES[k % VEHICLES.len()])
     }
 
     /// Returns the colour of vehicle `k` of `count`.
@@ -141,57 +106,29 @@ impl Theme {
         self.vehicle(if count <= LIMITS.colours { k } else { 0 })
     }
 
-    /// Keep-out shells.
-    pub(crate) fn shell(self) -> Colour {
-        self.pick(0x8F_B4_D9, 0x5C_7F_A3)
-    }
-
-    /// Obstacles.
-    pub(crate) fn obstacle(self) -> Colour {
-        self.pick(0xB8_A0_78, 0x8A_6D_3B)
-    }
-
-    /// Violations.
-    pub(crate) fn alarm(self) -> Colour {
-        self.pick(0xFF_2F_3C, 0xD4_00_14)
-    }
-
-    /// Text on the colour of violations.
-    pub(crate) fn on_alarm(self) -> Colour {
-        self.pick(0x14_00_02, 0xFF_FF_FF)
-    }
-
-    /// Clear verdicts.
-    pub(crate) fn good(self) -> Colour {
-        self.pick(0x6F_DD_8B, 0x11_63_29)
-    }
-
     /// Returns the colour of an edge: orange pushes (-1), grey is at rest (0), blue pulls (1). Colour-blind readers can
     /// tell the three apart.
     pub(crate) fn tension(self, tension: f32) -> Colour {
-        let push = self.pick(0xFF_9E_2C, 0xC8_5A_00);
-        let rest = self.pick(0x6B_75_80, 0xA6_AE_B7);
-        let pull = self.pick(0x4F_A3_FF, 0x0A_5E_A8);
+        let [push, rest, pull] = LINKS.map(|colour| self.pick(colour));
         rest.towards(if tension < 0.0 { push } else { pull }, tension.abs())
     }
-}
 
-impl Theme {
     /// Returns the colour of a quantity relative to its range, from 0 to 1.
     pub(crate) fn ramp(self, part: f32) -> Colour {
-        mixed(if self == Self::Dark { RAMP_ON_DARK } else { RAMP_ON_LIGHT }, part)
+        Colour::mixed(QUANTITIES.map(|colour| self.rgb(colour)), part)
     }
 }
 
 impl Colour {
     /// Returns the colour of a light at a part of the width of the swarm, from 0 to 1.
     pub(crate) fn light(part: f32) -> Self {
-        mixed(LIGHTS, part)
+        Self::mixed(LIGHTS.map(|colour| colour.dark), part)
     }
 
-    /// Returns the night sky behind lights.
-    pub(crate) fn night() -> Self {
-        NIGHT
+    /// Interpolates between even colours; `part` is from 0 to 1.
+    fn mixed(rgb: [u32; 4], part: f32) -> Self {
+        let [red, green, blue] = mixed(&rgb, part.into());
+        Self { rgba: [red, green, blue, 255] }
     }
 
     /// Returns the colour of a surface that receives this part of the light.
@@ -200,19 +137,12 @@ impl Colour {
     }
 }
 
-/// Interpolates between even colours; `part` is from 0 to 1.
-fn mixed(ramp: [u32; 4], part: f32) -> Colour {
-    let position = part.clamp(0.0, 1.0) * (ramp.len() - 1) as f32;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the ramp")]
-    let from = (position as usize).min(ramp.len() - 2);
-    Colour::hex(ramp[from]).towards(Colour::hex(ramp[from + 1]), position - from as f32)
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use tautline_report::drawing::colours::{ALARM, GOOD, INK, OBSTACLE, PAPER, SOFT_INK};
 
     /// Relative luminance, WCAG 2.2.
     fn luminance(colour: Colour) -> f32 {
@@ -229,18 +159,18 @@ mod tests {
     fn text_and_verdicts_have_enough_contrast_in_every_theme() {
         for (name, theme) in Theme::ALL {
             for (what, colour, least) in [
-                ("ink", theme.ink(), 7.0),
-                ("soft ink", theme.soft_ink(), 4.5),
-                ("alarm", theme.alarm(), 4.5),
-                ("good", theme.good(), 4.5),
+                ("ink", theme.pick(INK), 7.0),
+                ("soft ink", theme.pick(SOFT_INK), 4.5),
+                ("alarm", theme.pick(ALARM), 4.5),
+                ("good", theme.pick(GOOD), 4.5),
                 ("pushing", theme.tension(-1.0), 3.0),
                 ("pulling", theme.tension(1.0), 3.0),
                 ("vehicle", theme.vehicle(0), 3.0),
-                ("obstacle", theme.obstacle(), 3.0),
+                ("obstacle", theme.pick(OBSTACLE), 3.0),
                 ("small quantity", theme.ramp(0.0), 3.0),
                 ("large quantity", theme.ramp(1.0), 3.0),
             ] {
-                let found = contrast(colour, theme.background());
+                let found = contrast(colour, theme.pick(PAPER));
                 assert!(found >= least, "{what} in {name}: {found}");
             }
         }
@@ -284,7 +214,7 @@ mod tests {
     fn colour_blind_readers_can_tell_vehicles_apart() {
         for (palette, theme) in [(ON_DARK, Theme::Dark), (ON_LIGHT, Theme::Light)] {
             for (k, &a) in palette.iter().enumerate() {
-                assert!(contrast(Colour::hex(a), theme.background()) >= 3.0, "{a:x}");
+                assert!(contrast(Colour::hex(a), theme.pick(PAPER)) >= 3.0, "{a:x}");
                 for &b in &palette[..k] {
                     assert!(distance(a, b) > 0.04, "{a:x} and {b:x}: {}", distance(a, b));
                 }

@@ -11,8 +11,9 @@ use crate::timeline::Timeline;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use tautline_audit::Violation;
 use tautline_core::swarm::{Pair, Rows, row};
+use tautline_report::drawing::colours::{ALARM, NIGHT, PAPER};
+use tautline_report::drawing::{LIMITS, max_clearance_m};
 use tautline_report::flight_log::Frame;
-use tautline_report::replay::LIMITS;
 use tautline_sim::plan::Plan;
 
 /// Largest width, and largest height, of a picture without a legend \[pixels\].
@@ -176,7 +177,7 @@ impl Scene {
         let night = View { theme: Theme::Dark, ..view.clone() };
         let view = if view.has_lights() { &night } else { view };
         let builder = SceneBuilder::new(timeline, extent, frame, view, camera);
-        let background = if view.has_lights() { Colour::night() } else { view.theme.background() };
+        let background = view.theme.pick(if view.has_lights() { NIGHT } else { PAPER });
         let mut scene = Self::empty(camera, extent.depth_m(&camera), background);
         #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
         let shell_ratio = timeline.log.metric().ratio() as f32;
@@ -324,7 +325,7 @@ impl<'a> SceneBuilder<'a> {
 
     /// Returns the clearance that has the last colour of the ramp \[m\].
     pub(super) fn max_clearance_m(&self) -> f64 {
-        self.timeline.delta_m.unwrap_or_else(|| 10.0 * self.timeline.radius_m.iter().copied().fold(0.0, f64::max))
+        max_clearance_m(self.timeline.delta_m, self.timeline.radius_m.iter().copied())
     }
 
     /// Returns the clearance of each vehicle to the nearest other one: 1 for none, 0 for at least the largest one.
@@ -363,7 +364,7 @@ impl<'a> SceneBuilder<'a> {
 
     /// Returns the colour of a vehicle's body: that of a violation during one.
     pub(super) fn body_colour(&self, k: usize) -> Colour {
-        if self.alarmed[k] { self.view.theme.alarm() } else { self.colour(k) }
+        if self.alarmed[k] { self.view.theme.pick(ALARM) } else { self.colour(k) }
     }
 
     /// Returns the closest pair and its separation \[m\], if it is not in violation.

@@ -1,25 +1,18 @@
 //! Extent of a flight: scene coordinates, ground, and framing, constant over all frames.
 
-use std::sync::{Mutex, PoisonError};
-
 use nalgebra::Vector3;
 
 use super::camera::{Area, Camera, CameraSpec, Direction, Lens};
 use super::compose::View;
 use crate::error::RenderError;
 use crate::timeline::Timeline;
-use tautline_core::obstacle::{Obstacle, Shape};
+use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Pair, Rows, row};
+use tautline_report::drawing::{Ground, Surroundings, Viewpoint, box_corners, is_between, shape_bounds, turns_deg};
 use tautline_report::flight_log::{Frame, Keyframe};
-use tautline_report::replay::{Viewpoint, is_between, round_step, turns_deg};
 
 /// Largest number of vehicle positions that framing uses.
 const FRAMED_PLACES: usize = 200_000;
-/// Largest height of the lowest position above z = 0, relative to the extent of the flight, at which the ground is
-/// drawn at z = 0.
-const NEAR_GROUND: f64 = 0.3;
-/// Approximate number of ground lines along the longer side.
-const GROUND_LINES: f64 = 12.0;
 /// Largest number of vehicles that a message names.
 const MAX_NAMED: usize = 8;
 /// Radius of the view around a followed vehicle, in units of delta, or of the vehicle's radius without delta.
@@ -33,12 +26,8 @@ const SMOOTHED: f64 = 0.04;
 const FOLLOWED_TIMES: usize = 2000;
 /// Smallest depth that is drawn, in units of the largest: centimetres in a flight of tens of kilometres.
 const NEAREST: f64 = 1e-6;
-/// Distance around the flight up to which obstacles are framed, in units of its extent.
-const OBSTACLE_ROOM: f64 = 0.2;
 /// Largest size of a swarm that the camera `Auto` follows, relative to the extent of its flight.
 const TRAVELLING: f64 = 0.4;
-/// Smallest z of the unit normal of an obstacle that is the ground.
-const LEVEL: f64 = 0.999;
 
 /// Box around all vehicles at a time.
 #[derive(Clone, Copy, Debug)]
@@ -62,18 +51,12 @@ pub struct Extent {
     swarm: Vec<SwarmBox>,
     /// Whether the swarm travels so far that the camera `Auto` follows it.
     travels: bool,
-    /// Last computed framing; it is the same for all pictures of a film.
-    framed: Mutex<Option<(Direction, Area, Camera)>>,
     /// Largest speed of a vehicle between two samples \[m/s\].
     pub(super) max_speed_m_s: f64,
     /// Whether a flight has a violation.
     pub(super) has_violations: bool,
-    /// Whether the ground is an obstacle.
-    pub(super) has_hard_ground: bool,
-    /// Corners of the ground, in scene coordinates \[m\].
-    pub(super) ground_m: [Vector3<f64>; 2],
-    /// Distance of ground lines \[m\].
-    pub(super) grid_m: f64,
+    /// Ground, in scene coordinates.
+    pub(super) ground: Ground,
     /// Bounding ball of everything: centre and radius \[m\].
     reach: (Vector3<f64>, f64),
     /// Corners around the boxes among the obstacles, which may be beyond \[m\].
@@ -121,53 +104,30 @@ impl Extent {
             }
         }
         swarm.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        let mut largest = balls.iter().fold(0.0_f64, |largest, (_, radius)| largest.max(*radius));
-        let [lowest, highest] = bounds(&balls).unwrap_or([Vector3::zeros(); 2]);
-        let (mut low, mut high) = (lowest, highest);
-        let flown_m = (highest / 2.0 - lowest / 2.0).norm();
-        let obstacles: Vec<&Obstacle> =
-            timelines.iter().flat_map(|timeline| &timeline.plan).flat_map(|plan| &plan.obstacles).collect();
-        if balls.is_empty() {
-            largest = 1.0;
-        } else {
-            let room = Vector3::repeat(OBSTACLE_ROOM * (high - low).max() + largest);
-            let [least, most] = [low - room, high + room];
-            for corner in obstacles.iter().copied().flat_map(corners).map(|corner| corner.sup(&least).inf(&most)) {
-                (low, high) = (low.inf(&corner), high.sup(&corner));
-                balls.push((corner, 0.0));
-            }
-        }
-        // Halved first: the difference of the largest doubles overflows.
-        let origin_m = low / 2.0 + high / 2.0;
+        let largest = balls.iter().fold(0.0_f64, |largest, (_, radius)| largest.max(*radius));
+        let flown = bounds(&balls);
+        let flown_m = flown.map_or(0.0, |[low, high]| (high / 2.0 - low / 2.0).norm());
+        let obstacles = timelines.iter().flat_map(|timeline| &timeline.plan).flat_map(|plan| &plan.obstacles);
+        let solids: Vec<_> = obstacles.map(|obstacle| (obstacle.shape, obstacle.place_m)).collect();
+        let around = Surroundings::of(flown, largest, &solids);
+        let origin_m = around.middle_m();
+        balls.extend(around.obstacles_m.iter().map(|corner| (*corner, 0.0)));
         for (place, _) in &mut balls {
             *place -= origin_m;
         }
         for around in &mut swarm {
             around.centre -= origin_m;
         }
-        let hard_z = obstacles.iter().find_map(|obstacle| match obstacle.shape {
-            Shape::HalfSpace { normal } if is_level(normal) => Some(obstacle.place_m.z),
-            _ => None,
-        });
-        let is_near = lowest.z >= 0.0 && lowest.z <= NEAR_GROUND * (highest - lowest).norm() + largest;
-        let z = hard_z.unwrap_or(if is_near { 0.0 } else { low.z - largest }) - origin_m.z;
         let logs: Vec<_> = timelines.iter().map(|timeline| &*timeline.log).collect();
-        let solids: Vec<_> = obstacles.iter().map(|obstacle| (obstacle.shape, obstacle.place_m)).collect();
         let Viewpoint { azimuth_deg, elevation_deg, across } = Viewpoint::of(&logs, &solids);
         let oblique = Direction::perspective(azimuth_deg, elevation_deg);
         let auto = across.map_or(oblique, |axis| [Direction::SIDE, Direction::FRONT, Direction::TOP][axis]);
-        let (low, high) = (low - origin_m, high - origin_m);
-        let span = (high.x - low.x).max(high.y - low.y).max(2.0 * largest) + 2.0 * largest;
-        let grid_m = round_step(span / GROUND_LINES);
-        let corner = |point: Vector3<f64>, round: fn(f64) -> f64| {
-            let point = ((point + origin_m) / grid_m).map(round) * grid_m - origin_m;
-            Vector3::new(point.x, point.y, z)
-        };
-        let margin = Vector3::repeat(largest);
-        let ground_m = [corner(low - margin, f64::floor), corner(high + margin, f64::ceil)];
-        let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
-        let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
-        let boxes = obstacles.iter().copied().filter(|obstacle| matches!(obstacle.shape, Shape::Box { .. }));
+        let ground = Ground { corners_m: around.ground.corners_m.map(|corner| corner - origin_m), ..around.ground };
+        let [low, high] = around.box_m.map(|corner| corner - origin_m);
+        let (lowest, highest) = (ground.corners_m[0].inf(&low), ground.corners_m[1].sup(&high));
+        let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + around.around_m + ground.step_m);
+        let boxes = solids.iter().filter(|(shape, _)| matches!(shape, Shape::Box { .. }));
+        let boxes = boxes.filter_map(|(shape, at_m)| Some((box_corners(shape_bounds(shape)?), at_m - origin_m)));
         let swarm = smoothed(&swarm);
         let largest_m = swarm.iter().map(|around| around.half.norm()).fold(0.0, f64::max);
         let travels = largest_m < TRAVELLING * flown_m;
@@ -178,14 +138,11 @@ impl Extent {
             oblique,
             swarm,
             travels,
-            framed: Mutex::new(None),
             max_speed_m_s,
             has_violations: timelines.iter().any(|timeline| timeline.has_violations()),
-            has_hard_ground: hard_z.is_some(),
-            ground_m,
-            grid_m,
+            ground,
             reach,
-            boxes_m: boxes.flat_map(corners).map(|corner| corner - origin_m).collect(),
+            boxes_m: boxes.flat_map(|(corners, at_m)| corners.map(|corner| corner + at_m)).collect(),
         }
     }
 
@@ -306,15 +263,7 @@ impl Extent {
     }
 
     fn framing(&self, direction: Direction, area: Area) -> Camera {
-        let mut framed = self.framed.lock().unwrap_or_else(PoisonError::into_inner);
-        match &*framed {
-            Some((known, own_area, camera)) if *known == direction && *own_area == area => *camera,
-            _ => {
-                let camera = Camera::framing(direction, &self.balls, area);
-                *framed = Some((direction, area, camera));
-                camera
-            }
-        }
+        Camera::framing(direction, &self.balls, area)
     }
 
     /// Returns the corners of the box around all vehicles at a time \[s\].
@@ -324,10 +273,7 @@ impl Extent {
         let span_s = to.time_s - from.time_s;
         let part = if span_s > 0.0 { ((time_s - from.time_s) / span_s).clamp(0.0, 1.0) } else { 0.0 };
         let (centre, half) = (from.centre.lerp(&to.centre, part), from.half.lerp(&to.half, part));
-        Some(std::array::from_fn(|k| {
-            let side = |axis: usize| if k >> axis & 1 == 0 { -half[axis] } else { half[axis] };
-            (centre + Vector3::from_fn(|axis, _| side(axis)), 0.0)
-        }))
+        Some(box_corners([centre - half, centre + half]).map(|corner| (corner, 0.0)))
     }
 
     /// Returns the smallest and largest depth of the content for a camera \[m\].
@@ -338,11 +284,6 @@ impl Extent {
         let far = boxes().fold(middle + radius, f64::max).max(1e-2);
         [boxes().fold(middle - radius, f64::min).max(NEAREST * far), far]
     }
-}
-
-/// Returns whether a plane with this normal is level, with free space above.
-pub(super) fn is_level(normal: Vector3<f64>) -> bool {
-    normal.z >= LEVEL * normal.norm()
 }
 
 /// Returns the lowest and highest coordinates of balls' centres.
@@ -365,25 +306,6 @@ fn smoothed(swarm: &[SwarmBox]) -> Vec<SwarmBox> {
     let half = |k: usize| largest[near(k)].iter().sum::<Vector3<f64>>() / near(k).len() as f64;
     let smooth = |k: usize| SwarmBox { time_s: swarm[k].time_s, centre: centres[k], half: half(k) };
     (0..swarm.len()).map(smooth).collect()
-}
-
-/// Returns the corners of a box around an obstacle \[m\]; empty for an unbounded one.
-fn corners(obstacle: &Obstacle) -> Vec<Vector3<f64>> {
-    let (low, high) = match obstacle.shape {
-        Shape::Ball { radius_m } => (-Vector3::repeat(radius_m), Vector3::repeat(radius_m)),
-        Shape::Capsule { from_m, to_m, radius_m } => {
-            let round = Vector3::repeat(radius_m);
-            (from_m.inf(&to_m) - round, from_m.sup(&to_m) + round)
-        }
-        Shape::Box { half_m, .. } => {
-            let across = half_m.xy().norm();
-            let half = Vector3::new(across, across, half_m.z);
-            (-half, half)
-        }
-        Shape::HalfSpace { .. } => return Vec::new(),
-    };
-    let corner = |k: usize| Vector3::from_fn(|axis, _| if k >> axis & 1 == 0 { low[axis] } else { high[axis] });
-    (0..8).map(|k| obstacle.place_m + corner(k)).collect()
 }
 
 /// Returns the index of the vehicle with this name.

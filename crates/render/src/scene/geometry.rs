@@ -2,16 +2,16 @@
 //!
 //! Balls and boxes are solid, capsules are made of balls, planes are drawn with lines.
 
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::camera::Lens;
 use super::colour::{Colour, Colouring, Theme};
 use super::compose::SceneBuilder;
-use super::extent::is_level;
 use super::{Ball, Disc, Face, Line, Scene, single};
 use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::Pair;
-use tautline_report::replay::{LIMITS, MOST_LINKS, Rotors};
+use tautline_report::drawing::colours::{ALARM, INK, OBSTACLE, SHELL, SOFT_INK};
+use tautline_report::drawing::{LIGHT, LIMITS, MOST_LINKS, Rotors, box_sides, is_level, link_look, plane_section};
 use tautline_sim::plan::Plan;
 
 /// Largest number of line pieces of all trails together, and of one trail.
@@ -87,28 +87,24 @@ impl SceneBuilder<'_> {
         for k in 0..self.timeline.count() {
             let Some(place) = self.vehicle(k) else { continue };
             let alarm = self.alarmed[k];
-            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
-            let ball = |radius_m, colour| Ball { centre_m: single(place), radius_m: radius_m as f32, colour };
             let colour = self.body_colour(k);
-            match self.quadrotor(k) {
-                Some(quadrotor) => scene.balls.extend(quadrotor.body(colour, theme.ink())),
-                None => {
-                    scene.balls.push(ball(self.at_least(place, self.timeline.radius_m[k], MIN_RADIUS_PX[0]), colour));
-                }
+            if let Some(quadrotor) = self.quadrotor(k) {
+                scene.balls.extend(quadrotor.body(colour, theme.pick(INK)));
+            } else {
+                let radius_m = self.at_least(place, self.timeline.radius_m[k], MIN_RADIUS_PX[0]);
+                scene.balls.push(Ball::new(place, radius_m, colour));
             }
             if let Some(radius_m) = self.shell_m(k) {
                 let strength = if theme == Theme::Light { 0.75 } else { 0.6 };
-                let colour = if alarm { theme.alarm().at(0.85) } else { theme.shell().at(strength) };
-                let ball = ball(radius_m, colour);
+                let colour = if alarm { theme.pick(ALARM).at(0.85) } else { theme.pick(SHELL).at(strength) };
                 // In parallel projection all lines of sight are parallel to the view.
                 let metric = self.timeline.log.metric();
                 let away = metric.scaled(place - self.camera.eye_m);
                 let power = match self.camera.lens {
                     Lens::Perspective(_) => away.norm_squared() - radius_m * radius_m,
-                    Lens::Parallel(_) if !metric.is_metres() => -away.dot(&metric.scaled(self.camera.back)),
-                    Lens::Parallel(_) => -self.camera.in_camera_frame(Vector3::from(ball.centre_m.map(f64::from))).z,
+                    Lens::Parallel(_) => -away.dot(&metric.scaled(self.camera.back)),
                 };
-                shells.push((power, ball));
+                shells.push((power, Ball::new(place, radius_m, colour)));
             }
         }
         shells.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -117,9 +113,8 @@ impl SceneBuilder<'_> {
 
     pub(super) fn edges(&self, lines: &mut Vec<Line>) {
         let Some(plan) = self.timeline.plan.as_ref().filter(|plan| has_few_edges(plan)) else { return };
-        let many = plan.graph.edge_count() as f32;
-        let opacity = (36.0 / many).clamp(0.08, 0.9);
-        let width_px = (2.2 - many / 200.0).clamp(1.0, 2.2) * self.view.unit_px();
+        let (width_px, opacity) = link_look(plan.graph.edge_count());
+        let width_px = width_px * self.view.unit_px();
         for pair in plan.graph.edges().map(|(i, j)| Pair::new(i, j)) {
             let Some([from, to]) = self.ends(pair) else { continue };
             let tension = plan.tension(pair, (to - from).norm(), self.frame.time_s);
@@ -133,8 +128,8 @@ impl SceneBuilder<'_> {
     pub(super) fn pairs(&self, lines: &mut Vec<Line>) {
         let theme = self.view.theme;
         // The closest pair comes last and covers the others.
-        let alarmed = self.violated.iter().rev().map(|(violation, _)| (violation.pair, theme.alarm(), 5.0));
-        let nearest = self.closest_clear_pair().map(|(pair, _)| (pair, theme.ink(), 2.6));
+        let alarmed = self.violated.iter().rev().map(|(violation, _)| (violation.pair, theme.pick(ALARM), 5.0));
+        let nearest = self.closest_clear_pair().map(|(pair, _)| (pair, theme.pick(INK), 2.6));
         for (pair, colour, width) in nearest.into_iter().chain(alarmed) {
             let ends = self.ends(pair);
             lines.extend(ends.map(|ends| Line::new(ends, colour, width * self.view.unit_px())));
@@ -184,7 +179,7 @@ impl SceneBuilder<'_> {
                     let point_at =
                         |time_s: f64| single(start.lerp(&end, (time_s - pair[0].0) / (pair[1].0 - pair[0].0)));
                     let (colour, least) =
-                        if is_violation { (self.view.theme.alarm(), VIOLATED) } else { (colour, 0.0) };
+                        if is_violation { (self.view.theme.pick(ALARM), VIOLATED) } else { (colour, 0.0) };
                     let colours = [from_s, to_s].map(|time_s| colour.at(opacity(time_s).max(least)));
                     lines.push(Line { ends_m: [point_at(from_s), point_at(to_s)], colours, width_px });
                 }
@@ -194,7 +189,7 @@ impl SceneBuilder<'_> {
 
     /// Returns the vehicles with lines to the ground, with their positions and the points on the ground below.
     fn drops(&self) -> impl Iterator<Item = (usize, [Vector3<f64>; 2])> {
-        let (count, ground_m) = (self.timeline.count(), self.extent.ground_m[0].z);
+        let (count, ground_m) = (self.timeline.count(), self.extent.ground.corners_m[0].z);
         let shown = if count <= LIMITS.drops && self.camera.back.z < STRAIGHT_DOWN { count } else { 0 };
         (0..shown).filter_map(move |k| {
             let place = self.vehicle(k)?;
@@ -205,17 +200,15 @@ impl SceneBuilder<'_> {
     /// Draws a line from each vehicle to the ground.
     pub(super) fn drop_lines(&self, lines: &mut Vec<Line>) {
         let width_px = 1.1 * self.view.unit_px();
-        let line = |(_, ends_m)| Line::new(ends_m, self.view.theme.soft_ink().at(DROP), width_px);
+        let line = |(_, ends_m)| Line::new(ends_m, self.view.theme.pick(SOFT_INK).at(DROP), width_px);
         lines.extend(self.drops().map(line));
     }
 
     /// Draws a mark on the ground below each vehicle.
     pub(super) fn ground_marks(&self, discs: &mut Vec<Disc>) {
         let mark = |(k, [_, foot]): (usize, [Vector3<f64>; 2])| {
-            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
-            let radius_m = self.at_least(foot, self.timeline.radius_m[k], MIN_MARK_PX) as f32;
-            let colour = self.body_colour(k).at(GROUND_MARK);
-            Disc { centre_m: single(foot), radius_m, normal: [0.0, 0.0, 1.0], glow: 0.0, colour }
+            let radius_m = self.at_least(foot, self.timeline.radius_m[k], MIN_MARK_PX);
+            Disc::new(foot, radius_m, Vector3::z(), self.body_colour(k).at(GROUND_MARK))
         };
         discs.extend(self.drops().map(mark));
     }
@@ -228,11 +221,8 @@ impl SceneBuilder<'_> {
             let around_m = self.timeline.delta_m.map_or(GLOW_RADII * hull_m, |delta_m| GLOW_DELTAS * delta_m);
             let radius_m = self.at_least(place, around_m, MIN_GLOW_PX);
             let towards = self.camera.back * (1.1 * self.at_least(place, hull_m, MIN_RADIUS_PX[0]));
-            for (radius_m, colour) in [(radius_m, self.body_colour(k)), (WHITE * radius_m, self.view.theme.ink())] {
-                #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
-                let radius_m = radius_m as f32;
-                let (centre_m, normal) = (single(place + towards), single(self.camera.back));
-                discs.push(Disc { centre_m, radius_m, normal, glow: 1.0, colour });
+            for (radius_m, colour) in [(radius_m, self.body_colour(k)), (WHITE * radius_m, self.view.theme.pick(INK))] {
+                discs.push(Disc { glow: 1.0, ..Disc::new(place + towards, radius_m, self.camera.back, colour) });
             }
         }
     }
@@ -304,7 +294,7 @@ impl SceneBuilder<'_> {
         let arm = self.at_least(centre, 0.0, REFERENCE_PX);
         let [right, up] = [self.camera.right, self.camera.up].map(|axis| axis * arm);
         let corners = [centre + up, centre + right, centre - up, centre - right];
-        let side = |k: usize| Line::new([corners[k], corners[(k + 1) % 4]], self.view.theme.ink(), width_px);
+        let side = |k: usize| Line::new([corners[k], corners[(k + 1) % 4]], self.view.theme.pick(INK), width_px);
         lines.extend((0..4).map(side));
     }
 }
@@ -325,8 +315,6 @@ const BALLS_PER_RADIUS: f64 = 24.0;
 const MAX_BALLS: f64 = 3000.0;
 /// Number of intervals between the lines across a plane.
 const HATCHES: u32 = 12;
-/// Direction of the light in the axes of the camera, as in shaders/scene.wgsl.
-const LIGHT: [f64; 3] = [-0.408, 0.577, 0.707];
 /// Light on a side that faces away from the light, and on the rims of a box.
 const DARKEST: f64 = 0.45;
 const RIM: f32 = 0.35;
@@ -342,19 +330,17 @@ impl SceneBuilder<'_> {
 
     /// Draws balls and capsules.
     pub(super) fn round_obstacles(&self, scene: &mut Scene) {
-        let colour = self.view.theme.obstacle();
+        let colour = self.view.theme.pick(OBSTACLE);
         for obstacle in self.obstacles() {
             let place = obstacle.place_m - self.extent.origin_m();
-            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
-            let ball = |centre, radius_m: f64| Ball { centre_m: single(centre), radius_m: radius_m as f32, colour };
             match obstacle.shape {
-                Shape::Ball { radius_m } => scene.balls.push(ball(place, radius_m)),
+                Shape::Ball { radius_m } => scene.balls.push(Ball::new(place, radius_m, colour)),
                 Shape::Capsule { from_m, to_m, radius_m } => {
                     let needed = (BALLS_PER_RADIUS * (to_m - from_m).norm() / radius_m).ceil();
                     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
                     let count = needed.clamp(1.0, MAX_BALLS) as u32;
                     let along = |k: u32| place + from_m.lerp(&to_m, f64::from(k) / f64::from(count));
-                    scene.balls.extend((0..=count).map(|k| ball(along(k), radius_m)));
+                    scene.balls.extend((0..=count).map(|k| Ball::new(along(k), radius_m, colour)));
                 }
                 Shape::Box { .. } | Shape::HalfSpace { .. } => {}
             }
@@ -367,19 +353,12 @@ impl SceneBuilder<'_> {
             Shape::Box { half_m, yaw_deg } => Some((obstacle.place_m - self.extent.origin_m(), half_m, yaw_deg)),
             _ => None,
         });
-        boxes.flat_map(|(place, half_m, yaw_deg)| {
-            let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
-            (0..6).map(move |side| {
-                let axis = side / 2;
-                let half = [0, 1, 2].map(|k| turned * Vector3::ith((axis + k) % 3, half_m[(axis + k) % 3]));
-                (place, if side % 2 == 0 { half } else { half.map(|half| -half) })
-            })
-        })
+        boxes.flat_map(|(place, half_m, yaw_deg)| box_sides(half_m, yaw_deg).map(move |half| (place, half)))
     }
 
     /// Draws the solid sides of boxes, lit from above the camera's left shoulder.
     pub(super) fn walls(&self, faces: &mut Vec<Face>) {
-        let colour = self.view.theme.obstacle();
+        let colour = self.view.theme.pick(OBSTACLE);
         let light =
             (self.camera.right * LIGHT[0] + self.camera.up * LIGHT[1] + self.camera.back * LIGHT[2]).normalize();
         faces.extend(self.sides().map(|(place, [normal, u, v])| {
@@ -398,7 +377,7 @@ impl SceneBuilder<'_> {
             let [normal, u, v] = half.map(|half| half * RIM_SCALE);
             for (along, across) in [(u, v), (v, u)] {
                 let ends_m = [place + normal + across - along, place + normal + across + along];
-                lines.push(Line::new(ends_m, self.view.theme.obstacle().lit(RIM), width_px));
+                lines.push(Line::new(ends_m, self.view.theme.pick(OBSTACLE).lit(RIM), width_px));
             }
         }
         for obstacle in self.obstacles() {
@@ -407,12 +386,9 @@ impl SceneBuilder<'_> {
                 // The grid of the ground shows a level plane.
                 Shape::HalfSpace { normal } if is_level(normal) => {}
                 Shape::HalfSpace { normal } => {
-                    let normal = normal.normalize();
                     let (centre, reach_m) = self.extent.reach();
-                    let foot = centre - normal * (centre - place).dot(&normal);
-                    let least = normal.iamin();
-                    let u = normal.cross(&Vector3::ith(least, 1.0)).normalize() * reach_m;
-                    self.hatched(foot, u, normal.cross(&u), lines);
+                    let [foot, u, v] = plane_section(normal, centre - place, reach_m);
+                    self.hatched(place + foot, u, v, lines);
                 }
                 Shape::Ball { .. } | Shape::Capsule { .. } | Shape::Box { .. } => {}
             }
@@ -421,7 +397,7 @@ impl SceneBuilder<'_> {
 
     /// Draws a hatched parallelogram with this centre and half sides `u` and `v`.
     fn hatched(&self, middle: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>, lines: &mut Vec<Line>) {
-        let (colour, width_px) = (self.view.theme.obstacle().at(PLANE), 1.4 * self.view.unit_px());
+        let (colour, width_px) = (self.view.theme.pick(OBSTACLE).at(PLANE), 1.4 * self.view.unit_px());
         for k in 0..=HATCHES {
             let share = 2.0 * f64::from(k) / f64::from(HATCHES) - 1.0;
             let is_rim = k == 0 || k == HATCHES;
@@ -438,13 +414,8 @@ impl SceneBuilder<'_> {
 /// pixels high \[pixels\].
 const BALL_PX: f64 = 3.0;
 const MIN_HULL_PX: f64 = 13.0;
-/// Lengths relative to the arm: radii of the body and the mark ahead, distance of the mark, height of the rotors above
-/// the body's centre, width of an arm.
-const BODY: f64 = 0.3;
+/// Radius of the mark ahead relative to the arm.
 const NOSE: f64 = 0.13;
-const AHEAD: f64 = 0.72;
-const ABOVE: f64 = 0.18;
-const ARM: f64 = 0.11;
 /// Smallest width of an arm, and width of a blade, in a picture 720 pixels high \[pixels\].
 const ARM_PX: f32 = 1.5;
 const BLADE_PX: f32 = 1.2;
@@ -468,22 +439,17 @@ impl Quadrotor {
 
     /// Returns the body and the mark ahead.
     pub(super) fn body(&self, colour: Colour, nose: Colour) -> [Ball; 2] {
-        #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
-        let ball = |centre, share: f64, colour| Ball {
-            centre_m: single(centre),
-            radius_m: (share * self.arm_m) as f32,
-            colour,
-        };
-        [ball(self.place, BODY, colour), ball(self.nose(), NOSE, nose)]
+        let body = Ball::new(self.place, Rotors::BODY * self.arm_m, colour);
+        [body, Ball::new(self.nose(), NOSE * self.arm_m, nose)]
     }
 
     fn nose(&self) -> Vector3<f64> {
-        self.at(Vector3::x() * (AHEAD * self.arm_m))
+        self.at(self.rotors.nose_m())
     }
 
     /// Returns the centres of the rotors \[m\].
     fn rotors(&self) -> [Vector3<f64>; 4] {
-        self.rotors.places_m(ABOVE * self.arm_m).map(|rotor_m| self.at(rotor_m))
+        self.rotors.places_m().map(|rotor_m| self.at(rotor_m))
     }
 
     /// Returns the unit vector along the thrust.
@@ -515,10 +481,7 @@ impl SceneBuilder<'_> {
     pub(super) fn rotors(&self, discs: &mut Vec<Disc>) {
         let mut ordered = Vec::new();
         for (quadrotor, colour) in self.quadrotors() {
-            let (normal, colour) = (single(quadrotor.up()), colour.at(DISC));
-            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
-            let radius_m = quadrotor.rotors.radius_m as f32;
-            let disc = |centre| Disc { centre_m: single(centre), radius_m, normal, glow: 0.0, colour };
+            let disc = |centre| Disc::new(centre, quadrotor.rotors.radius_m, quadrotor.up(), colour.at(DISC));
             ordered.extend(quadrotor.rotors().map(|centre| (self.camera.in_camera_frame(centre).z, disc(centre))));
         }
         ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -532,9 +495,9 @@ impl SceneBuilder<'_> {
         for (quadrotor, colour) in self.quadrotors() {
             let px_per_m = self.camera.project(quadrotor.place).map_or(0.0, |projection| projection.px_per_m);
             #[expect(clippy::cast_possible_truncation, reason = "pixels")]
-            let width_px = (ARM * quadrotor.arm_m * px_per_m) as f32;
+            let width_px = (Rotors::WIDTH * quadrotor.arm_m * px_per_m) as f32;
             let width_px = width_px.max(ARM_PX * unit_px);
-            lines.push(Line::new([quadrotor.place, quadrotor.nose()], self.view.theme.ink(), width_px));
+            lines.push(Line::new([quadrotor.place, quadrotor.nose()], self.view.theme.pick(INK), width_px));
             let across = quadrotor.up().cross(&self.camera.back).try_normalize(1e-6);
             for rotor in quadrotor.rotors() {
                 lines.push(Line::new([quadrotor.place, rotor], colour, width_px));

@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 
 use super::camera::Lens;
-use super::colour::{Colour, Theme};
 use super::compose::SceneBuilder;
 use super::labels::{LabelLayout, width};
 use super::{Annotation, Line};
 use tautline_core::text::decimals_of;
+use tautline_report::drawing::colours::{AXES, LINE, SOFT_INK};
 
 /// Largest number of ground lines in each direction.
 const MAX_LINES: u32 = 60;
@@ -22,11 +22,6 @@ const CROSSINGS: u32 = 240;
 /// Length of the axes in a picture 720 pixels high \[pixels\], and part of it below which an axis is not drawn.
 const TRIAD_PX: f32 = 30.0;
 const FORESHORTENED: f32 = 0.15;
-/// Colours of x, y and z on dark and on light background.
-const AXES: [[Colour; 3]; 2] = [
-    [Colour::hex(0xE0_6C_75), Colour::hex(0x7F_C9_7F), Colour::hex(0x61_AF_EF)],
-    [Colour::hex(0xB0_2A_37), Colour::hex(0x2B_7A_2B), Colour::hex(0x1F_5F_B0)],
-];
 
 /// Smallest component of the direction of a parallel camera along an axis that it looks along.
 const ALONG_AXIS: f64 = 0.999_999;
@@ -34,7 +29,7 @@ const ALONG_AXIS: f64 = 0.999_999;
 impl SceneBuilder<'_> {
     /// Returns the corners of the ground \[m\], which fills the picture of a parallel camera along an axis.
     fn ground_m(&self) -> [Vector3<f64>; 2] {
-        let ([low, high], step, camera) = (self.extent.ground_m, self.extent.grid_m, &self.camera);
+        let ([low, high], step, camera) = (self.extent.ground.corners_m, self.extent.ground.step_m, &self.camera);
         let Lens::Parallel([across, half]) = camera.lens else { return [low, high] };
         if camera.back.amax() < ALONG_AXIS {
             return [low, high];
@@ -55,9 +50,9 @@ impl SceneBuilder<'_> {
     }
 
     pub(super) fn ground(&self, lines: &mut Vec<Line>) {
-        let ([low, high], step) = (self.ground_m(), self.extent.grid_m);
-        let width_px = self.view.unit_px().max(0.7) * if self.extent.has_hard_ground { HARD } else { 1.0 };
-        let colour = self.view.theme.grid();
+        let ([low, high], step) = (self.ground_m(), self.extent.ground.step_m);
+        let width_px = self.view.unit_px().max(0.7) * if self.extent.ground.is_obstacle { HARD } else { 1.0 };
+        let colour = self.view.theme.pick(LINE);
         for (along, across) in [(0, 1), (1, 0)] {
             for k in 0..=steps(high[along] - low[along], step) {
                 let mut ends_m = [low, low];
@@ -69,15 +64,11 @@ impl SceneBuilder<'_> {
         }
     }
 
-    fn axes(&self) -> [Colour; 3] {
-        AXES[usize::from(self.view.theme != Theme::Dark)]
-    }
-
     /// Draws the directions of the axes in the lower right corner, and coordinates in metres where ground lines end or
     /// leave the picture.
     pub(super) fn scale(&self, labels: &mut LabelLayout) {
         let [low, high] = self.ground_m();
-        let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
+        let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.pick(SOFT_INK));
         if self.view.has_legend() {
             self.triad(labels);
         }
@@ -120,7 +111,7 @@ impl SceneBuilder<'_> {
     /// \[pixels\]. The texts are beyond the ends of the lines, or where the lines leave the picture. All are at one
     /// side of the picture that is not taken.
     fn numbers(&self, axis: usize, is_high: bool, size_px: f32, taken: &mut Option<usize>) -> Vec<([f64; 2], String)> {
-        let ([low, high], step, origin_m) = (self.ground_m(), self.extent.grid_m, self.extent.origin_m());
+        let ([low, high], step, origin_m) = (self.ground_m(), self.extent.ground.step_m, self.extent.origin_m());
         let other = 1 - axis;
         let (from, to) = if is_high { (high[other], low[other]) } else { (low[other], high[other]) };
         let from = from + OUTWARDS * step * (from - to).signum();
@@ -171,7 +162,7 @@ impl SceneBuilder<'_> {
         let (size_px, unit_px) = (self.view.text_px(0.8), self.view.unit_px());
         let (arm, reach) = (TRIAD_PX * unit_px, TRIAD_PX * unit_px + size_px);
         let middle = self.view.size_px.map(|side| side as f32 - reach - self.view.margin_px());
-        for (axis, colour) in self.axes().into_iter().enumerate() {
+        for (axis, colour) in AXES.map(|colour| self.view.theme.pick(colour)).into_iter().enumerate() {
             #[expect(clippy::cast_possible_truncation, reason = "pixels")]
             let [x, y] = [self.camera.right[axis] as f32, -self.camera.up[axis] as f32];
             if x.hypot(y) < FORESHORTENED {

@@ -23,6 +23,8 @@ pub(super) use labels::width;
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
+#[cfg(feature = "window")]
+use tautline_report::drawing::colours::PAPER;
 
 /// A ball. A solid one is lit; a shell lets through what is within and behind it.
 #[repr(C)]
@@ -34,6 +36,13 @@ pub struct Ball {
     pub radius_m: f32,
     /// Colour; the opacity of a shell is that of its rim.
     pub colour: Colour,
+}
+
+impl Ball {
+    #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+    fn new(centre_m: Vector3<f64>, radius_m: f64, colour: Colour) -> Self {
+        Self { centre_m: single(centre_m), radius_m: radius_m as f32, colour }
+    }
 }
 
 /// A flat solid parallelogram, such as a wall. Its colour holds the light that it receives.
@@ -62,6 +71,14 @@ pub struct Disc {
     pub glow: f32,
     /// Colour; the opacity is that of the rim, or of the centre of a glow.
     pub colour: Colour,
+}
+
+impl Disc {
+    /// A disc with a rim.
+    #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+    fn new(centre_m: Vector3<f64>, radius_m: f64, normal: Vector3<f64>, colour: Colour) -> Self {
+        Self { centre_m: single(centre_m), radius_m: radius_m as f32, normal: single(normal), glow: 0.0, colour }
+    }
 }
 
 /// A straight line of the same width near and far.
@@ -190,7 +207,7 @@ impl Scene {
                 size_px,
             ),
             [0.1, 1.0],
-            Theme::Dark.background(),
+            Theme::Dark.pick(PAPER),
         )
     }
 }

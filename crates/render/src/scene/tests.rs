@@ -11,6 +11,7 @@ use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
 use tautline_laws::space::{Metric, closest_pair};
+use tautline_report::drawing::colours::{ALARM, NIGHT, PAPER};
 use tautline_report::figures;
 use tautline_report::flight_log::FlightLog;
 use tautline_report::replay::PAGE_BYTES;
@@ -120,7 +121,7 @@ fn layers_that_are_off_draw_nothing() {
 #[test]
 fn a_violation_is_shown_while_it_lasts_and_in_the_verdict_after() {
     let timeline = timeline();
-    let alarm = Theme::Dark.alarm();
+    let alarm = Theme::Dark.pick(ALARM);
     let red = |scene: &Scene| scene.balls.iter().filter(|ball| ball.colour == alarm).count();
     let says = |scene: &Scene, what: &str| words(scene).iter().any(|text| text.contains(what));
     let [before, during, after] = [3.9, 5.0, 6.1].map(|time_s| scene(&timeline, time_s, &View::default()));
@@ -197,7 +198,7 @@ fn only_the_part_of_a_trail_in_violation_is_red() {
     let timeline = timeline();
     let trails = View { layers: Layers { trails: true, ..Layers::NONE }, ..View::default() };
     let scene = scene(&timeline, 10.0, &trails);
-    let alarm = Theme::Dark.alarm().rgba;
+    let alarm = Theme::Dark.pick(ALARM).rgba;
     let red = scene.lines.iter().filter(|line| line.colours[0].rgba[..3] == alarm[..3]);
     let length_m = |line: &Line| f64::from(line.ends_m[1][0] - line.ends_m[0][0]);
     let red_m: f64 = red.map(length_m).sum();
@@ -232,7 +233,7 @@ fn no_vehicle_is_under_the_texts() {
         let scene = scene(&timeline, 0.0, &camera(text));
         let band = scene.annotations.iter().any(|annotation| match annotation {
             Annotation::Box { corners_px: [[left, _], [right, _]], colour, .. } => {
-                *left == 0.0 && *right == 1280.0 && *colour == Theme::Dark.background()
+                *left == 0.0 && *right == 1280.0 && *colour == Theme::Dark.pick(PAPER)
             }
             _ => false,
         });
@@ -419,9 +420,9 @@ fn lights_are_on_a_night_sky_in_any_theme() {
     for theme in [Theme::Dark, Theme::Light] {
         let view = View { theme, ..View::default() }.with_lights();
         let [clear, violated] = [2.0, 5.0].map(|time_s| scene(&timeline, time_s, &view));
-        assert_eq!((clear.background, clear.discs.len()), (Colour::night(), 4 * 2));
+        assert_eq!((clear.background, clear.discs.len()), (Theme::Dark.pick(NIGHT), 4 * 2));
         assert!(clear.discs.iter().all(|disc| disc.glow == 1.0));
-        let alarm = Theme::Dark.alarm();
+        let alarm = Theme::Dark.pick(ALARM);
         assert!(clear.balls.iter().all(|ball| ball.colour != alarm));
         assert_eq!(violated.balls.iter().filter(|ball| ball.colour == alarm).count(), 2, "a violation is red");
     }
@@ -699,9 +700,8 @@ mod quadrotors {
     use crate::timeline::Timeline;
     use tautline_core::record::{Channel, Sample};
     use tautline_core::swarm::{Rows, Swarm};
-    use tautline_report::replay::Rotors;
+    use tautline_report::drawing::Rotors;
 
-    const ABOVE: f64 = 0.18;
     const PLACES_M: [f64; 6] = [0.0, 0.0, 1.0, 3.0, 0.0, 1.0];
 
     /// Returns two vehicles 3 m apart with the same attitude.
@@ -734,7 +734,7 @@ mod quadrotors {
         assert_eq!(scene.discs.len(), 8);
         let expected = PLACES_M.chunks_exact(3).flat_map(|place| {
             let place = Vector3::new(place[0], place[1], place[2]) - origin_m;
-            rotors.places_m(ABOVE * rotors.arm_m()).map(|rotor_m| place + attitude * rotor_m)
+            rotors.places_m().map(|rotor_m| place + attitude * rotor_m)
         });
         let nearest = |rotor: Vector3<f64>| {
             let off = |disc: &Disc| {

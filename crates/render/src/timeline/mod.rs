@@ -8,17 +8,14 @@ use tautline_audit::{ObjectPair, Status, Violation};
 use tautline_core::record::{Event, Sample};
 use tautline_laws::space::Metric;
 use tautline_recordings::mcap::{Entry, McapRecording, StoredAudit};
+use tautline_report::drawing::{Rotors, UNKNOWN_RADIUS_M};
 use tautline_report::flight_log::FlightLog;
-use tautline_report::replay::Rotors;
 use tautline_sim::plan::Plan;
 use tautline_sim::scenario::{Scenario, Source};
 
 mod tracks;
 
 pub use tracks::TracksError;
-
-/// Radius of a vehicle without a known radius \[m\].
-const UNKNOWN_RADIUS_M: f64 = 0.1;
 
 /// Flight with everything that its pictures show: the log, and data that are constant over the flight.
 #[derive(Clone, Debug)]
@@ -175,8 +172,7 @@ impl Timeline {
 
     /// Returns whether the flight has a violation so far.
     pub(crate) fn has_violations(&self) -> bool {
-        let violations = self.log.violations();
-        violations.of_vehicles().next().is_some() || violations.of_obstacles().next().is_some()
+        !self.log.violations().all().is_empty()
     }
 
     fn until_s(&self, time_s: f64) -> f64 {

@@ -64,7 +64,7 @@ impl OpenWindow {
         let input = egui_winit::State::new(context, ViewportId::ROOT, &window, Some(scale), None, side);
         let mut renderer = GpuRenderer::on(gpu);
         let picture_px = clamped_size(window.inner_size().into(), &renderer);
-        let view = &renderer.draw(&Scene::blank(picture_px), false)?.words_view;
+        let view = &renderer.draw(&Scene::blank(picture_px))?.bytes_view;
         let nearest = wgpu::FilterMode::Nearest;
         let texture = panels.renderer.write().register_native_texture(&panels.device, view, nearest);
         let (extent, known_keyframes) = (Extent::of(timeline), timeline.log.keyframes().len());
@@ -99,7 +99,7 @@ impl OpenWindow {
 
     /// Draws the picture between the panels.
     pub(super) fn show_picture(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        let view = &self.renderer.draw(scene, false)?.words_view;
+        let view = &self.renderer.draw(scene)?.bytes_view;
         let mut panels = self.panels.renderer.write();
         let nearest = wgpu::FilterMode::Nearest;
         panels.update_egui_texture_from_wgpu_texture(&self.panels.device, view, nearest, self.texture);

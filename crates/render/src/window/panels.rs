@@ -8,7 +8,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::player::Player;
 use super::state::{WINDOW_KEYS, WindowState};
-use crate::gpu::paint;
+use crate::overlay::paint;
 use crate::scene::{Extent, Projected, Scene, metres};
 use tautline_core::swarm::{Pair, row};
 use tautline_report::flight_log::Frame;
@@ -179,9 +179,8 @@ fn marks(ui: &Ui, slider: Rect, [first_s, last_s]: [f64; 2], player: &Player) {
         slider.left() + handle + part * (slider.width() - 2.0 * handle)
     };
     let (painter, log) = (ui.painter(), &player.timeline.log);
-    let obstacles = log.violations().of_obstacles().map(|(found, _)| [found.from_s, found.to_s]);
-    for [from_s, to_s] in log.violations().of_vehicles().map(|found| [found.from_s, found.to_s]).chain(obstacles) {
-        let (from, to) = (x(from_s), x(to_s.min(last_s)).max(x(from_s) + 2.0));
+    for found in log.violations().all() {
+        let (from, to) = (x(found.from_s), x(found.to_s.min(last_s)).max(x(found.from_s) + 2.0));
         let bar = Rect::from_min_max(pos2(from, slider.bottom() - 3.0), pos2(to, slider.bottom()));
         painter.rect_filled(bar, 0.0, ALARM);
     }

@@ -96,9 +96,8 @@ impl Player {
 
     /// Pauses at the worst instant of the next or previous violation.
     pub(super) fn seek_violation(&mut self, is_next: bool) {
-        let (violations, now_s) = (self.timeline.log.violations(), self.time_s);
-        let obstacles = violations.of_obstacles().map(|(found, _)| found.min_at_s);
-        let worst_s = violations.of_vehicles().map(|found| found.min_at_s).chain(obstacles);
+        let now_s = self.time_s;
+        let worst_s = self.timeline.log.violations().all().iter().map(|found| found.min_at_s);
         let found = if is_next {
             worst_s.filter(|&at_s| at_s > now_s).min_by(f64::total_cmp)
         } else {

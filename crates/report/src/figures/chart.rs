@@ -3,7 +3,8 @@
 use super::Figure;
 use super::axis::{Axis, Scale};
 use super::labels::Labels;
-use super::svg::{Align, Canvas, Colour, GRID, Marker, Point, SOFT_INK, Stroke, TEXT, text_px, thinned};
+use super::svg::{Align, Canvas, Marker, Point, Stroke, TEXT, text_px, thinned};
+use crate::drawing::colours::{GRID, SOFT_INK, ThemeColour};
 
 /// Largest number of entries of a legend.
 pub(super) const LEGEND: usize = 6;
@@ -44,22 +45,27 @@ pub(super) struct Line {
     pub(super) label: Option<String>,
 }
 
-/// An area between two curves over the same abscissae: (x, low, high).
-#[derive(Clone, Debug)]
-pub(super) struct Band {
-    pub(super) points: Vec<(f64, f64, f64)>,
-    pub(super) colour: Colour,
-    pub(super) opacity: f64,
-    pub(super) label: Option<String>,
-}
-
 /// A filled polygon in the units of the axes, within the chart.
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
     pub(super) corners: Vec<(f64, f64)>,
-    pub(super) colour: Colour,
+    pub(super) colour: ThemeColour,
     pub(super) opacity: f64,
     pub(super) label: Option<String>,
+}
+
+impl Shape {
+    /// Returns the area between two curves over the same abscissae: (x, low, high).
+    pub(super) fn band(
+        points: &[(f64, f64, f64)],
+        colour: ThemeColour,
+        opacity: f64,
+        label: impl Into<Option<String>>,
+    ) -> Self {
+        let low = points.iter().map(|&(x, low, _)| (x, low));
+        let high = points.iter().rev().map(|&(x, _, high)| (x, high));
+        Self { corners: low.chain(high).collect(), colour, opacity, label: label.into() }
+    }
 }
 
 /// A mark at a point, with an optional text beside it.
@@ -67,7 +73,7 @@ pub(super) struct Shape {
 pub(super) struct Mark {
     pub(super) at: (f64, f64),
     pub(super) marker: Marker,
-    pub(super) colour: Colour,
+    pub(super) colour: ThemeColour,
     pub(super) radius: f64,
     pub(super) text: Option<String>,
     pub(super) label: Option<String>,
@@ -75,12 +81,12 @@ pub(super) struct Mark {
 
 impl Mark {
     /// Returns a ring with an optional entry in the legend.
-    pub(super) fn ring(at: (f64, f64), colour: Colour, label: Option<String>) -> Self {
+    pub(super) fn ring(at: (f64, f64), colour: ThemeColour, label: Option<String>) -> Self {
         Self { at, marker: Marker::Ring, colour, radius: 4.5, text: None, label }
     }
 
     /// Returns a cross with an optional entry in the legend.
-    pub(super) fn cross(at: (f64, f64), colour: Colour, label: Option<String>) -> Self {
+    pub(super) fn cross(at: (f64, f64), colour: ThemeColour, label: Option<String>) -> Self {
         Self { at, marker: Marker::Cross, colour, radius: 4.0, text: None, label }
     }
 }
@@ -93,7 +99,6 @@ pub(super) struct Chart {
     /// Whether units have the same length on both axes.
     equal: bool,
     pub(super) shapes: Vec<Shape>,
-    pub(super) bands: Vec<Band>,
     pub(super) lines: Vec<Line>,
     pub(super) marks: Vec<Mark>,
     pub(super) inset: Option<Inset>,
@@ -121,13 +126,13 @@ pub(super) struct Inset {
 #[derive(Clone, Copy)]
 enum Paint {
     Line(Stroke),
-    Area(Colour, f64),
+    Area(ThemeColour, f64),
 }
 
 impl Chart {
     pub(super) fn new(x: Axis, y: Axis) -> Self {
-        let (bands, lines, marks) = (Vec::new(), Vec::new(), Vec::new());
-        Self { x, y, equal: false, shapes: Vec::new(), bands, lines, marks, inset: None, panel: None, left: LEFT }
+        let (shapes, lines, marks) = (Vec::new(), Vec::new(), Vec::new());
+        Self { x, y, equal: false, shapes, lines, marks, inset: None, panel: None, left: LEFT }
     }
 
     /// Gives units the same length on both axes, which widens one of them.
@@ -190,15 +195,14 @@ impl Chart {
         draw_frame(&mut canvas, [&self.x, &self.y], on_paper);
         self.draw_abscissae(&mut canvas, end);
 
-        for Shape { corners, colour, opacity, .. } in &self.shapes {
-            let corners: Vec<_> = corners.iter().filter_map(|&at| self.place(at)).map(on_paper).collect();
-            canvas.area(&corners, *colour, *opacity);
-        }
-        let bands = self.bands.iter().map(|band| (Paint::Area(band.colour, band.opacity), self.outline(band)));
+        let areas = self.shapes.iter().map(|shape| {
+            let corners = shape.corners.iter().filter_map(|&at| self.place(at)).collect::<Vec<_>>();
+            (Paint::Area(shape.colour, shape.opacity), corners)
+        });
         let lines = self.lines.iter().flat_map(|line| {
             self.stretches(&line.points).into_iter().map(|stretch| (Paint::Line(line.stroke), stretch))
         });
-        let shapes = bands.chain(lines).map(|(paint, places)| (paint, places.into_iter().map(on_paper).collect()));
+        let shapes = areas.chain(lines).map(|(paint, places)| (paint, places.into_iter().map(on_paper).collect()));
         for (paint, points) in thinned(shapes.collect()) {
             match paint {
                 Paint::Line(stroke) => canvas.line(&points, stroke),
@@ -339,20 +343,12 @@ impl Chart {
         stretches.map(|stretch| stretch.iter().copied().flatten().collect()).collect()
     }
 
-    /// Returns the outline of a band: along its lower curve, then back along the upper one.
-    fn outline(&self, band: &Band) -> Vec<(f64, f64)> {
-        let low = band.points.iter().map(|&(x, low, _)| (x, low));
-        let high = band.points.iter().rev().map(|&(x, _, high)| (x, high));
-        low.chain(high).filter_map(|point| self.place(point)).collect()
-    }
-
     /// Returns the entries of the legend, in rows of the width of a figure.
     fn legend(&self) -> Vec<Vec<Entry<'_>>> {
         let shapes = self.shapes.iter().map(|of| (&of.label, Sample::Area(of.colour, of.opacity)));
-        let bands = self.bands.iter().map(|band| (&band.label, Sample::Area(band.colour, band.opacity)));
         let lines = self.lines.iter().map(|line| (&line.label, Sample::Line(line.stroke)));
         let marks = self.marks.iter().map(|mark| (&mark.label, Sample::Mark(mark)));
-        let labelled = shapes.chain(bands).chain(lines).chain(marks);
+        let labelled = shapes.chain(lines).chain(marks);
         let entries = labelled.filter_map(|(words, sample)| Some(Entry { words: words.as_deref()?, sample }));
         let mut rows: Vec<Vec<_>> = Vec::new();
         let mut used = f64::INFINITY;
@@ -429,7 +425,7 @@ struct Entry<'a> {
 }
 
 enum Sample<'a> {
-    Area(Colour, f64),
+    Area(ThemeColour, f64),
     Line(Stroke),
     Mark(&'a Mark),
 }

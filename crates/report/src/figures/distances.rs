@@ -2,9 +2,10 @@
 
 use super::Figure;
 use super::axis::{Axis, Scale};
-use super::chart::{Band, Chart, LEGEND, Line, Mark, Panel};
+use super::chart::{Chart, LEGEND, Line, Mark, Panel, Shape};
 use super::spans::{Span, Spans};
-use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
+use super::svg::Stroke;
+use crate::drawing::colours::{INK, SOFT_INK, VEHICLES};
 use crate::flight_log::{FEW_VEHICLES, FlightLog, nearest_present, pairs};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, separation};
 use tautline_core::text::{beside_limit, counted};
@@ -38,7 +39,7 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
         of_many_pairs(&spans, &mut chart)
     };
     let drawn = chart.lines.iter().flat_map(|line| line.points.iter().map(|&(_, y)| y));
-    let bands = chart.bands.iter().flat_map(|band| band.points.iter().map(|&(_, _, high)| high));
+    let bands = chart.shapes.iter().flat_map(|band| band.corners.iter().map(|&(_, y)| y));
     let marked = closest.map(|closest| closest.separation_m);
     let numbers: Vec<f64> = drawn.chain(bands).chain(marked).chain([delta_m]).chain(certified_m).collect();
     chart.y = Axis::distances("m", &numbers, delta_m);
@@ -57,7 +58,7 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ{both} = {delta_m} m"));
     if let Some(certified_m) = certified_m.filter(|_| !is_equal) {
         // Its dashes remain visible on the line of delta.
-        let stroke = Stroke::dashed(PALETTE[CERTIFIED], 1.6);
+        let stroke = Stroke::dashed(VEHICLES[CERTIFIED], 1.6);
         chart.level(certified_m, stroke, format!("certified {} m", beside_limit(certified_m, delta_m, 3)));
     }
     let scale = if chart.y.scale == Scale::Log { " on a logarithmic axis" } else { "" };
@@ -79,7 +80,7 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     let places = hits.iter().filter_map(|hit| Some((hit.time_s, log.hit_distance_m(hit)?)));
     for (k, at) in places.enumerate() {
         let label = (k == 0).then(|| format!("hulls hit, {in_words}"));
-        chart.marks.push(Mark::cross(at, PALETTE[HIT], label));
+        chart.marks.push(Mark::cross(at, VEHICLES[HIT], label));
     }
     if hit_count > 0 {
         description.extend([" Hulls hit ", &in_words, "."]);
@@ -144,15 +145,13 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
     let scaled = |span: &Span<'_>| spans.log.metric().scaled_rows(span.positions_m);
     let ranks: Vec<_> = instants.iter().map(|span| quantiles_m(&scaled(span), &ranked_pairs, &mut scratch)).collect();
     let times_s = || instants.iter().map(|span| span.time_s);
-    let band = |low: usize, high: usize, opacity: f64, label: &str| Band {
-        points: times_s().zip(&ranks).map(|(time_s, ranks)| (time_s, ranks[low], ranks[high])).collect(),
-        colour: PALETTE[0],
-        opacity,
-        label: Some(label.to_owned()),
+    let band = |low: usize, high: usize, opacity: f64, label: &str| {
+        let points = times_s().zip(&ranks).map(|(time_s, ranks)| (time_s, ranks[low], ranks[high]));
+        Shape::band(&points.collect::<Vec<_>>(), VEHICLES[0], opacity, label.to_owned())
     };
-    chart.bands = vec![band(0, 4, 0.16, "5 to 95 %"), band(1, 3, 0.28, "25 to 75 %")];
+    chart.shapes = vec![band(0, 4, 0.16, "5 to 95 %"), band(1, 3, 0.28, "25 to 75 %")];
     let median = times_s().zip(&ranks).map(|(time_s, ranks)| (time_s, ranks[2])).collect();
-    chart.line(median, Stroke::solid(PALETTE[0], 1.6), "median");
+    chart.line(median, Stroke::solid(VEHICLES[0], 1.6), "median");
 
     // Includes the time between samples, if the recording covers it.
     let swept: Vec<_> = spans.iter().filter_map(|span| Some((span.time_s, span.closest?))).collect();
@@ -169,7 +168,7 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
     for (k, pair) in closest_pairs(&closest, spans.vehicles()).into_iter().enumerate() {
         let apart_m = |span: &Span<'_>| separation(&scaled(span), pair.first(), pair.second());
         let apart = spans.iter().map(|span| (span.time_s, apart_m(span))).collect();
-        chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair_label(pair));
+        chart.line(apart, Stroke::solid(VEHICLES[k + 1], 1.0), pair_label(pair));
     }
     let at_ends = || closest.iter().map(|&(time_s, closest)| (time_s, closest.separation_m)).collect();
     let smallest = if is_swept { steps(&closest) } else { at_ends() };

@@ -5,7 +5,8 @@ use super::axis::{Axis, extent};
 use super::chart::{TITLE, WIDTH};
 use tautline_core::text::{at_least, capitalised, decimals_of};
 
-use super::svg::{Align, Canvas, Marker, SOFT_INK, Stroke, TEXT, text_px};
+use super::svg::{Align, Canvas, Marker, Stroke, TEXT, text_px};
+use crate::drawing::colours::{SOFT_INK, mixed};
 
 /// Space for the numbers and the label below the cells \[px\].
 const BELOW: f64 = 44.0;
@@ -21,8 +22,7 @@ const HEIGHT: f64 = 260.0;
 const STEPS: u32 = 40;
 /// Colours from the smallest to the largest number: cividis of Nunez, Anderton and Renslow (2018). Its lightness grows
 /// evenly, and colour-blind readers can distinguish its colours. They are the same on light and dark paper.
-const COLOURS: [[u8; 3]; 6] =
-    [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
+const COLOURS: [u32; 6] = [0x00_22_4E, 0x35_45_6C, 0x66_69_70, 0x94_8E_77, 0xC8_B8_66, 0xFE_E8_38];
 
 /// An axis of a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,16 +129,8 @@ fn description(label: &str, [x, y]: [GridAxis<'_>; 2], numbers: &[Option<f64>]) 
 
 /// Returns the colour of a place on the scale, from 0 to 1, and a colour of words that can be read on it.
 fn colour(share: f64) -> (String, &'static str) {
-    let along = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of colours")]
-    let below = (along.floor() as usize).min(COLOURS.len() - 2);
-    let part = along - below as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]
-    let channel = |k: usize| {
-        let [from, to] = [COLOURS[below][k], COLOURS[below + 1][k]].map(f64::from);
-        (from + part * (to - from)).round() as u8
-    };
-    let fill = format!("#{:02X}{:02X}{:02X}", channel(0), channel(1), channel(2));
+    let [red, green, blue] = mixed(&COLOURS, share);
+    let fill = format!("#{red:02X}{green:02X}{blue:02X}");
     (fill, if share < 0.55 { "#FFFFFE" } else { "#000001" })
 }
 

@@ -1,6 +1,7 @@
 //! Places of short texts beside marks, where they overlap neither each other nor a mark.
 
-use super::svg::{Align, Canvas, Marker, Point, Rect, SOFT_INK, Stroke, text_px, text_rect};
+use super::svg::{Align, Canvas, Marker, Point, Rect, Stroke, text_px, text_rect};
+use crate::drawing::colours::SOFT_INK;
 
 /// Distances of the middle of a text from its mark \[px\]. From the second on, a line joins both.
 const DISTANCES: [f64; 5] = [9.5, 19.0, 27.0, 36.0, 46.0];

@@ -5,7 +5,8 @@ use super::axis::{Axis, extent};
 use super::chart::{TITLE, WIDTH};
 use tautline_core::text::significant;
 
-use super::svg::{Align, Canvas, GRID, INK, Marker, PALETTE, SOFT_INK, Stroke, text_px};
+use super::svg::{Align, Canvas, Marker, Stroke, text_px};
+use crate::drawing::colours::{GRID, INK, SOFT_INK, VEHICLES};
 
 /// Height of a row, of the numbers and label below the rows, and of the label of the limit \[px\].
 const ROW: f64 = 26.0;
@@ -70,12 +71,12 @@ pub fn by_law(
         };
         if row.interval.iter().any(Option::is_some) {
             let ends = [row.interval[0].unwrap_or(x.from), row.interval[1].unwrap_or(x.to)].map(on_paper);
-            canvas.line(&ends.map(|end| (end, y)), Stroke::solid(PALETTE[0], 1.6));
+            canvas.line(&ends.map(|end| (end, y)), Stroke::solid(VEHICLES[0], 1.6));
             for (end, _) in ends.into_iter().zip(row.interval).filter(|(_, end)| end.is_some()) {
-                canvas.line(&[(end, y - 4.0), (end, y + 4.0)], Stroke::solid(PALETTE[0], 1.6));
+                canvas.line(&[(end, y - 4.0), (end, y + 4.0)], Stroke::solid(VEHICLES[0], 1.6));
             }
         }
-        canvas.marker(Marker::Dot, (on_paper(value), y), 4.5, PALETTE[0]);
+        canvas.marker(Marker::Dot, (on_paper(value), y), 4.5, VEHICLES[0]);
     }
     canvas.line(&[(left, top), (left, bottom), (RIGHT, bottom)], Stroke::solid(SOFT_INK, 0.8));
     canvas.text((f64::midpoint(left, RIGHT), bottom + BELOW - 6.0), Align::CENTRE_BELOW, label);

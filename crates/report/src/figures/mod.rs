@@ -30,7 +30,7 @@
 //! figure is bounded for any swarm and duration: for many vehicles it shows quantiles and extremes, and its description
 //! states that.
 //!
-//! A file has a white panel. A page replaces the colours by those of its theme (`page_rules`). Colour-blind
+//! A file has a white panel. A page replaces the colours by those of its theme (`drawing::colours`). Colour-blind
 //! readers can distinguish the colours.
 
 mod axis;
@@ -62,7 +62,6 @@ pub use studies::{Histogram, Separation, Share, attack, histograms, margin, sepa
 pub use validation::{Step, convergence, tension_curve};
 
 use spans::Spans;
-pub(crate) use svg::page_rules;
 use tautline_audit::MovingObstacle;
 use tautline_laws::graph::Graph;
 use tautline_laws::target::Leg;

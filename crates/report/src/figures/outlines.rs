@@ -1,7 +1,8 @@
 //! Outlines of obstacles, from above and in space.
 
-use nalgebra::{Rotation2, Rotation3, Vector2, Vector3};
+use nalgebra::{Rotation2, Vector2, Vector3};
 
+use crate::drawing::{box_corners, box_sides, perpendicular};
 use tautline_audit::MovingObstacle;
 use tautline_core::obstacle::Shape;
 
@@ -99,30 +100,21 @@ impl Room {
 
     /// Returns the corners of the section of the box by a plane through a position, in order around their middle.
     fn section(&self, place: Vector3<f64>, normal: Vector3<f64>) -> Vec<Vector3<f64>> {
-        let corner =
-            |k: usize| Vector3::from_fn(|axis, _| if k >> axis & 1 == 0 { self.low[axis] } else { self.high[axis] });
+        let corners = box_corners([self.low, self.high]);
         let edges = (0..8_usize).flat_map(|k| (0..3).map(move |axis| (k, k | 1 << axis))).filter(|(k, to)| k != to);
-        let mut corners: Vec<_> = edges
+        let mut crossings: Vec<_> = edges
             .filter_map(|(k, to)| {
-                let (from, to) = (corner(k), corner(to));
+                let (from, to) = (corners[k], corners[to]);
                 let [near, far] = [from, to].map(|at| (at - place).dot(&normal));
                 ((near < 0.0) != (far < 0.0)).then(|| from + (to - from) * (near / (near - far)))
             })
             .collect();
-        let middle = corners.iter().sum::<Vector3<f64>>() / corners.len().max(1) as f64;
-        let [across, up] = beside(normal);
+        let middle = crossings.iter().sum::<Vector3<f64>>() / crossings.len().max(1) as f64;
+        let [across, up] = perpendicular(normal.normalize());
         let angle = |at: &Vector3<f64>| (at - middle).dot(&up).atan2((at - middle).dot(&across));
-        corners.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
-        corners
+        crossings.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+        crossings
     }
-}
-
-/// Returns two unit vectors that are perpendicular to a vector and to each other.
-fn beside(along: Vector3<f64>) -> [Vector3<f64>; 2] {
-    let along = along.try_normalize(1e-12).unwrap_or(Vector3::z());
-    let other = if along.z.abs() > 0.9 { Vector3::x() } else { Vector3::z() };
-    let across = along.cross(&other).normalize();
-    [across, along.cross(&across)]
 }
 
 /// Returns the outline of an obstacle at its first position as lines within a box. A box has its edges, and a ball has
@@ -133,18 +125,10 @@ pub(super) fn wires(obstacle: &MovingObstacle, room: &Room) -> Vec<Vec<Vector3<f
         Shape::Ball { radius_m } => capsule(Vector3::zeros(), Vector3::zeros(), radius_m),
         Shape::Capsule { from_m, to_m, radius_m } => capsule(from_m, to_m, radius_m),
         Shape::Box { half_m, yaw_deg } => {
-            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
-            let face = |axis: usize, side: f64| {
-                let [one, other] = [(axis + 1) % 3, (axis + 2) % 3];
-                let corner = |(a, b): (f64, f64)| {
-                    let mut at = Vector3::zeros();
-                    (at[axis], at[one], at[other]) = (side * half_m[axis], a * half_m[one], b * half_m[other]);
-                    turn * at
-                };
-                [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(corner).to_vec()
-            };
-            // The faces below and above, and two sides: every edge is among theirs.
-            [(2, -1.0), (2, 1.0), (0, -1.0), (0, 1.0)].map(|(axis, side)| face(axis, side)).to_vec()
+            // Every edge is one of the faces below and above, or of two sides.
+            let faces = box_sides(half_m, yaw_deg).enumerate().filter(|(side, _)| side / 2 != 1);
+            let corners = |[out, u, v]: [Vector3<f64>; 3]| vec![out + u + v, out - u + v, out - u - v, out + u - v];
+            faces.map(|(_, face)| corners(face)).collect()
         }
         Shape::HalfSpace { normal } => {
             let section = room.section(place, normal);
@@ -173,7 +157,7 @@ pub(super) fn wires(obstacle: &MovingObstacle, room: &Room) -> Vec<Vec<Vector3<f
 /// Returns two lengthwise sections of a capsule, and rings around its ends.
 fn capsule(from: Vector3<f64>, to: Vector3<f64>, radius: f64) -> Vec<Vec<Vector3<f64>>> {
     let along = (to - from).try_normalize(1e-12).unwrap_or(Vector3::z());
-    let [across, up] = beside(along);
+    let [across, up] = perpendicular(along);
     let ring = |one: Vector3<f64>, other: Vector3<f64>, ends: [Vector3<f64>; 2]| -> Vec<Vector3<f64>> {
         let corner = |k: u32| {
             let (sin, cos) = (std::f64::consts::TAU * (f64::from(k) + 0.5) / f64::from(CORNERS)).sin_cos();

@@ -2,10 +2,11 @@
 
 use super::Figure;
 use super::axis::Axis;
-use super::chart::{Band, Chart, LEGEND, Line, Mark};
+use super::chart::{Chart, LEGEND, Line, Mark, Shape};
 use super::distances::quantile;
 use super::spans::{Span, Spans};
-use super::svg::{INK, PALETTE, Stroke};
+use super::svg::Stroke;
+use crate::drawing::colours::{INK, VEHICLES};
 use crate::flight_log::{FEW_VEHICLES, FlightLog, ROTORS, SERIES};
 use tautline_core::text::up_to;
 use tautline_laws::formation::{evaluated_edges, largest_edge_error_m};
@@ -125,10 +126,10 @@ fn of_each(chart: &mut Chart, spans: &Spans<'_>, numbers: impl for<'b> Fn(&'b Sp
         });
         let ranks: Vec<_> = ranks.collect();
         let points = |k: usize| ranks.iter().map(|(time_s, ranks)| (*time_s, ranks[k])).collect();
-        chart.line(points(3), Stroke::solid(PALETTE[1], 1.5), "largest");
-        chart.line(points(1), Stroke::solid(PALETTE[0], 1.5), "median");
-        let points = ranks.iter().map(|&(time_s, [low, _, high, _])| (time_s, low, high)).collect();
-        chart.bands.push(Band { points, colour: PALETTE[0], opacity: 0.2, label: Some("5 to 95 %".to_owned()) });
+        chart.line(points(3), Stroke::solid(VEHICLES[1], 1.5), "largest");
+        chart.line(points(1), Stroke::solid(VEHICLES[0], 1.5), "median");
+        let points: Vec<_> = ranks.iter().map(|&(time_s, [low, _, high, _])| (time_s, low, high)).collect();
+        chart.shapes.push(Shape::band(&points, VEHICLES[0], 0.2, "5 to 95 %".to_owned()));
     }
 }
 
@@ -141,7 +142,7 @@ pub fn energy(log: &FlightLog, title: &str) -> Figure {
     let y = Axis::linear("energy E [m²/s²]", points.iter().map(|&(_, y)| y).chain(initial).chain([0.0]), true);
     let largest = points.iter().map(|&(_, y)| y).fold(f64::NAN, f64::max);
     let mut chart = Chart::new(spans.time_axis(), y);
-    chart.line(points, Stroke::solid(PALETTE[0], 1.8), "E(t)");
+    chart.line(points, Stroke::solid(VEHICLES[0], 1.8), "E(t)");
     let mut comparison = String::new();
     if let Some(initial) = initial {
         chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m²/s²"));
@@ -200,7 +201,7 @@ fn decay(
     let y = Axis::log(&format!("{what} [{unit}]"), points.iter().map(|&(_, y)| y).chain(allowed));
     let at_end = points.last().map_or(f64::NAN, |&(_, y)| y);
     let mut chart = Chart::new(spans.time_axis(), y);
-    chart.line(points, Stroke::solid(PALETTE[0], 1.8), what);
+    chart.line(points, Stroke::solid(VEHICLES[0], 1.8), what);
     if let Some(allowed) = allowed {
         chart.level(allowed, Stroke::dashed(INK, 1.3), format!("counts as reached: {allowed} {unit}"));
     }

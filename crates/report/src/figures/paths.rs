@@ -6,7 +6,8 @@ use super::chart::{Chart, Line, Mark, Shape};
 use super::distances::evenly;
 use super::outlines::{Window, outline};
 use super::spans::Spans;
-use super::svg::{Colour, INK, Marker, OBSTACLE, PALETTE, SOFT_INK, Stroke};
+use super::svg::{Marker, Stroke};
+use crate::drawing::colours::{INK, OBSTACLE, SOFT_INK, ThemeColour, VEHICLES};
 use crate::flight_log::{FEW_VEHICLES, FlightLog};
 use tautline_audit::MovingObstacle;
 
@@ -118,8 +119,8 @@ pub(super) fn drawn(log: &FlightLog, most: usize) -> Vec<usize> {
 /// Look of the path of a vehicle.
 pub(super) struct Look {
     pub(super) path: Stroke,
-    pub(super) start: Colour,
-    pub(super) end: Colour,
+    pub(super) start: ThemeColour,
+    pub(super) end: ThemeColour,
     pub(super) radius: f64,
     pub(super) number: Option<String>,
 }
@@ -131,9 +132,9 @@ impl Look {
             let number = Some((vehicle + 1).to_string());
             return Self { path, start: path.colour, end: path.colour, radius: 4.5, number };
         }
-        let path = Stroke::solid(PALETTE[0], 0.8).faint(0.45);
+        let path = Stroke::solid(VEHICLES[0], 0.8).faint(0.45);
         let radius = if count <= 100 { 3.0 } else { 2.0 };
-        Self { path, start: SOFT_INK, end: PALETTE[1], radius, number: None }
+        Self { path, start: SOFT_INK, end: VEHICLES[1], radius, number: None }
     }
 }
 

@@ -2,8 +2,9 @@
 
 use super::Figure;
 use super::axis::{Axis, Scale, extent};
-use super::chart::{Band, Chart, Inset, Mark};
-use super::svg::{INK, PALETTE, Stroke};
+use super::chart::{Chart, Inset, Mark, Shape};
+use super::svg::Stroke;
+use crate::drawing::colours::{INK, VEHICLES};
 use tautline_core::text::up_to;
 
 /// Width of the inset of a closest approach, relative to the distance in the plane.
@@ -58,15 +59,7 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
     let mut chart = Chart::new(Axis::time(from_s, to_s), y);
     for (k, encounter) in encounters.iter().enumerate() {
         let [first, second] = &encounter.names;
-        let stroke = Stroke::of_line(k);
-        for known in encounter.distances.split(|point| point.1.is_nan()) {
-            if known.iter().any(|point| point.2 > 0.0) {
-                let points = known.iter().map(|&(t, d, slack)| (t, (d - slack).max(least), d + slack)).collect();
-                chart.bands.push(Band { points, colour: stroke.colour, opacity: 0.22, label: None });
-            }
-        }
-        let points = encounter.distances.iter().map(|&(t, d, _)| (t, d)).collect();
-        chart.line(points, stroke, format!("{first} and {second}"));
+        uncertain_line(&mut chart, k, &encounter.distances, least, format!("{first} and {second}"));
     }
     chart.level(limit, Stroke::solid(INK, 2.0), format!("limit {limit:?} {unit}"));
     let mut description = format!("{title} over time; the limit is {limit:?} {unit}.");
@@ -78,6 +71,17 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
         chart.marks.push(Mark::ring((encounter.closest_s, drawn), INK, Some(format!("closest {closest}"))));
     }
     chart.figure(name, title, &description)
+}
+
+/// Adds the `k`-th line through points (time, distance, uncertainty), with bands where the distance is uncertain, which
+/// end at `least`.
+fn uncertain_line(chart: &mut Chart, k: usize, points: &[(f64, f64, f64)], least: f64, label: String) {
+    let stroke = Stroke::of_line(k);
+    for known in points.split(|point| point.1.is_nan()).filter(|known| known.iter().any(|point| point.2 > 0.0)) {
+        let points: Vec<_> = known.iter().map(|&(t, d, slack)| (t, (d - slack).max(least), d + slack)).collect();
+        chart.shapes.push(Shape::band(&points, stroke.colour, 0.22, None));
+    }
+    chart.line(points.iter().map(|&(t, d, _)| (t, d)).collect(), stroke, label);
 }
 
 /// Lower bound of a distance in an interval of time.
@@ -101,7 +105,7 @@ pub fn smallest(bounds: &[LowerBound], closest: &Encounter, title: &str) -> Figu
     let numbers: Vec<_> = points.iter().map(|point| point.1).chain([limit]).collect();
     let mut chart = Chart::new(Axis::time(from_s, to_s), Axis::distances(unit, &numbers, limit));
     let least = bounds.iter().map(|bound| bound.distance).min_by(f64::total_cmp);
-    chart.line(points, Stroke::solid(PALETTE[0], 1.5), "smallest in each interval");
+    chart.line(points, Stroke::solid(VEHICLES[0], 1.5), "smallest in each interval");
     chart.level(limit, Stroke::solid(INK, 2.0), format!("limit {limit:?} {unit}"));
     let words = closest.closest();
     let ring = |least| Mark::ring((closest.closest_s, least), INK, Some(format!("closest {words}")));
@@ -142,8 +146,8 @@ pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     let nearest = encounter.nearest();
     let places = encounter.paths_m.each_ref().map(|path| nearest.and_then(|k| path.get(k).copied()));
     for (k, (path, name)) in encounter.paths_m.iter().zip(&encounter.names).enumerate() {
-        chart.line(path.clone(), Stroke::solid(PALETTE[k], 1.6), name.clone());
-        chart.marks.extend(places[k].map(|at| Mark::ring(at, PALETTE[k], None)));
+        chart.line(path.clone(), Stroke::solid(VEHICLES[k], 1.6), name.clone());
+        chart.marks.extend(places[k].map(|at| Mark::ring(at, VEHICLES[k], None)));
     }
     let closest = encounter.closest();
     if let [Some(one), Some(other)] = places {
@@ -177,12 +181,7 @@ pub fn plan_distances(lines: &[PlanLine<'_>], tube_m: Option<f64>, title: &str) 
     let (from_s, to_s) = extent(all().map(|point| point.0)).unwrap_or((0.0, 0.0));
     let mut chart = Chart::new(Axis::time(from_s, to_s), y);
     for (k, (name, points)) in lines.iter().take(DRAWN).enumerate() {
-        let stroke = Stroke::of_line(k);
-        for known in points.split(|point| point.1.is_nan()).filter(|known| known.iter().any(|point| point.2 > 0.0)) {
-            let points = known.iter().map(|&(t, d, slack)| (t, (d - slack).max(0.0), d + slack)).collect();
-            chart.bands.push(Band { points, colour: stroke.colour, opacity: 0.22, label: None });
-        }
-        chart.line(points.iter().map(|&(t, d, _)| (t, d)).collect(), stroke, name.clone());
+        uncertain_line(&mut chart, k, points, 0.0, name.clone());
     }
     if let Some(tube_m) = tube_m {
         chart.level(tube_m, Stroke::solid(INK, 2.0), format!("tube {tube_m:?} m"));

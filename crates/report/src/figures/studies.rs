@@ -3,7 +3,8 @@
 use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Line, Mark};
-use super::svg::{ALARM, INK, PALETTE, SOFT_INK, Stroke};
+use super::svg::Stroke;
+use crate::drawing::colours::{ALARM, INK, SOFT_INK, VEHICLES};
 use tautline_core::text::{exact, separation, significant};
 
 /// Draws the smallest separation found so far \[m\] over the `flights` of a search, with delta and the separation of
@@ -20,13 +21,13 @@ pub fn attack(found: &[(u64, f64)], flights: u64, delta_m: f64, own_m: Option<f6
         points.push((flight as f64, min_m));
     }
     points.extend(points.last().map(|&(_, worst_m)| (last, worst_m)));
-    chart.line(points, Stroke::solid(PALETTE[0], 1.8), "worst so far");
+    chart.line(points, Stroke::solid(VEHICLES[0], 1.8), "worst so far");
     chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", exact(delta_m)));
     if let Some(own_m) = own_m {
         chart.level(own_m, Stroke::dashed(SOFT_INK, 1.0), "unchanged scenario".to_owned());
     }
     let worst = found.last();
-    chart.marks.extend(worst.map(|&(flight, min_m)| Mark::ring((flight as f64, min_m), PALETTE[0], None)));
+    chart.marks.extend(worst.map(|&(flight, min_m)| Mark::ring((flight as f64, min_m), VEHICLES[0], None)));
     let found = worst.map(|(flight, min_m)| format!("{} m in flight {flight}", separation(*min_m)));
     let found = found.unwrap_or_else(|| "no flight".to_owned());
     let description = format!("The smallest separation found over the flights of the search: {found}.");
@@ -57,9 +58,9 @@ pub fn margin(
 ) -> Figure {
     let mut chart = chart_of_shares(key, does, shares.iter(), logarithmic);
     for (k, share) in shares.iter().enumerate() {
-        chart.interval(share.value, share.interval, Stroke::solid(PALETTE[0], 1.2));
+        chart.interval(share.value, share.interval, Stroke::solid(VEHICLES[0], 1.2));
         let flights = if share.interval.is_some() { "with its 95 % interval" } else { "one flight" };
-        let ring = Mark::ring((share.value, share.share), PALETTE[0], (k == 0).then(|| flights.to_owned()));
+        let ring = Mark::ring((share.value, share.share), VEHICLES[0], (k == 0).then(|| flights.to_owned()));
         chart.marks.push(Mark { radius: 3.5, ..ring });
     }
     let turn = draw_turn(&mut chart, bracket, predicted);
@@ -74,7 +75,7 @@ fn draw_turn(chart: &mut Chart, bracket: Option<[f64; 2]>, predicted: &[(f64, St
         chart.upright(side, Stroke::dashed(SOFT_INK, 1.0), label);
     }
     for (k, (value, what)) in predicted.iter().enumerate() {
-        let stroke = Stroke::dashed(PALETTE[1 + k % 2], 1.5);
+        let stroke = Stroke::dashed(VEHICLES[1 + k % 2], 1.5);
         // A prediction beyond the axis has an entry in the legend only if the entry says so.
         let label = if chart.x.place(*value).is_some() {
             format!("predicted {what}")
@@ -109,7 +110,7 @@ pub fn verdicts(
     chart.lines.push(Line { points, stroke: Stroke::solid(SOFT_INK, 1.0), label: None });
     let at = |of: &Separation| (of.value, of.smallest_m);
     let mark = |of: &Separation, holds: bool, label| {
-        if holds { Mark::ring(at(of), PALETTE[0], label) } else { Mark::cross(at(of), ALARM, label) }
+        if holds { Mark::ring(at(of), VEHICLES[0], label) } else { Mark::cross(at(of), ALARM, label) }
     };
     for (verdict, word) in [true, false].into_iter().zip(words) {
         let marked = flights.iter().filter(|&&(_, holds)| holds == verdict);

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use maud::{PreEscaped, html};
 
 use super::Figure;
+use crate::drawing::colours::{INK, PAPER, SOFT_INK, ThemeColour, VEHICLES};
 use crate::simplify::needed;
 
 /// A position on the drawing, to the right and down \[px\].
@@ -20,52 +21,10 @@ const HEADING: f64 = 14.5;
 const TITLE_BASELINE: f64 = 19.0;
 const MARK_WIDTH: f64 = 1.6;
 
-/// A colour on white paper, and the variable of a page's style sheet that replaces it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Colour {
-    light: &'static str,
-    variable: &'static str,
-}
-
-const fn colour(light: &'static str, variable: &'static str) -> Colour {
-    Colour { light, variable }
-}
-
-const PAPER: Colour = colour("#FFFFFF", "--plot");
-pub(super) const INK: Colour = colour("#1B1F24", "--ink");
-pub(super) const SOFT_INK: Colour = colour("#57606A", "--soft");
-pub(super) const GRID: Colour = colour("#E1E4E8", "--grid");
-/// Obstacles, and violations.
-pub(super) const OBSTACLE: Colour = colour("#8A6D3B", "--thing");
-pub(super) const ALARM: Colour = colour("#D40014", "--alarm");
-
-/// Colours that colour-blind readers can distinguish, each with a contrast of at least 3 on both papers. They are Paul
-/// Tol's scheme "muted" (technical note SRON/EPS/TN/09-002, issue 3.2), whose cyan and sand are replaced by the light
-/// blue of "medium-contrast" and whose teal is darker.
-pub(super) const PALETTE: [Colour; 8] = [
-    colour("#332288", "--c1"),
-    colour("#CC6677", "--c2"),
-    colour("#3F9E8E", "--c3"),
-    colour("#AA4499", "--c4"),
-    colour("#999933", "--c5"),
-    colour("#6699CC", "--c6"),
-    colour("#117733", "--c7"),
-    colour("#882255", "--c8"),
-];
-
-/// Returns the rules that give the figures of a page its colours. A file has none and stays readable on white paper.
-pub(crate) fn page_rules() -> String {
-    let all = [PAPER, INK, SOFT_INK, GRID, OBSTACLE, ALARM].into_iter().chain(PALETTE);
-    let rules = all.flat_map(|Colour { light, variable }| {
-        ["fill", "stroke"].map(|paint| format!(".tautline-figure [{paint}=\"{light}\"]{{{paint}:var({variable})}}"))
-    });
-    rules.collect()
-}
-
 /// Stroke of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stroke {
-    pub(super) colour: Colour,
+    pub(super) colour: ThemeColour,
     width: f64,
     opacity: f64,
     /// Lengths of dashes and gaps; `None` for a solid line.
@@ -76,18 +35,18 @@ const DASHED: Option<&str> = Some("6 4");
 const DOTTED: Option<&str> = Some("2 3");
 
 impl Stroke {
-    pub(super) fn solid(colour: Colour, width: f64) -> Self {
+    pub(super) fn solid(colour: ThemeColour, width: f64) -> Self {
         Self { colour, width, opacity: 1.0, dashes: None }
     }
 
-    pub(super) fn dashed(colour: Colour, width: f64) -> Self {
+    pub(super) fn dashed(colour: ThemeColour, width: f64) -> Self {
         Self { dashes: DASHED, ..Self::solid(colour, width) }
     }
 
     /// Returns the stroke of the `k`-th of several lines: colours change first, then dashes.
     pub(super) fn of_line(k: usize) -> Self {
-        let dashes = [None, DASHED, DOTTED][(k / PALETTE.len()) % 3];
-        Self { dashes, ..Self::solid(PALETTE[k % PALETTE.len()], 1.5) }
+        let dashes = [None, DASHED, DOTTED][(k / VEHICLES.len()) % 3];
+        Self { dashes, ..Self::solid(VEHICLES[k % VEHICLES.len()], 1.5) }
     }
 
     /// Returns the stroke of lines that are not told apart.
@@ -138,8 +97,8 @@ impl Canvas {
     pub(super) fn new(size: (f64, f64), title: &str, middle: f64) -> Self {
         let title = printable(title);
         let shapes = html! {
-            rect width="100%" height="100%" fill=(PAPER.light) {}
-            text x=(px(middle)) y=(px(TITLE_BASELINE)) text-anchor="middle" font-size=(HEADING) fill=(INK.light) {
+            rect width="100%" height="100%" fill=(PAPER.hex()) {}
+            text x=(px(middle)) y=(px(TITLE_BASELINE)) text-anchor="middle" font-size=(HEADING) fill=(INK.hex()) {
                 (title)
             }
         };
@@ -152,10 +111,10 @@ impl Canvas {
         let shape = match *points {
             [] => return,
             [(x, y)] => html! {
-                circle cx=(px(x)) cy=(px(y)) r=(width) fill=(colour.light) opacity=[stroke.opacity()] {}
+                circle cx=(px(x)) cy=(px(y)) r=(width) fill=(colour.hex()) opacity=[stroke.opacity()] {}
             },
             _ => html! {
-                polyline points=(corners(points)) stroke=(colour.light) stroke-width=(width) stroke-dasharray=[dashes]
+                polyline points=(corners(points)) stroke=(colour.hex()) stroke-width=(width) stroke-dasharray=[dashes]
                     opacity=[stroke.opacity()] {}
             },
         };
@@ -163,11 +122,11 @@ impl Canvas {
     }
 
     /// Fills a polygon.
-    pub(super) fn area(&mut self, points: &[Point], colour: Colour, opacity: f64) {
+    pub(super) fn area(&mut self, points: &[Point], colour: ThemeColour, opacity: f64) {
         if points.is_empty() {
             return;
         }
-        let shape = html! { polygon points=(corners(points)) fill=(colour.light) opacity=(opacity) {} };
+        let shape = html! { polygon points=(corners(points)) fill=(colour.hex()) opacity=(opacity) {} };
         self.shapes += &shape.into_string();
     }
 
@@ -187,16 +146,16 @@ impl Canvas {
     }
 
     /// Draws a marker of a radius \[px\].
-    pub(super) fn marker(&mut self, marker: Marker, (x, y): Point, radius: f64, colour: Colour) {
+    pub(super) fn marker(&mut self, marker: Marker, (x, y): Point, radius: f64, colour: ThemeColour) {
         match marker {
             Marker::Ring => {
                 let shape = html! {
-                    circle cx=(px(x)) cy=(px(y)) r=(radius) stroke=(colour.light) stroke-width=(MARK_WIDTH) {}
+                    circle cx=(px(x)) cy=(px(y)) r=(radius) stroke=(colour.hex()) stroke-width=(MARK_WIDTH) {}
                 };
                 self.shapes += &shape.into_string();
             }
             Marker::Dot => {
-                let shape = html! { circle cx=(px(x)) cy=(px(y)) r=(radius) fill=(colour.light) {} };
+                let shape = html! { circle cx=(px(x)) cy=(px(y)) r=(radius) fill=(colour.hex()) {} };
                 self.shapes += &shape.into_string();
             }
             Marker::Cross => {
@@ -215,7 +174,7 @@ impl Canvas {
         let window = html! {
             svg x=(px(x)) y=(px(y)) width=(px(side)) height=(px(side))
                 viewBox=(format!("{} {} {} {}", px(x), px(y), px(side), px(side))) {
-                rect x=(px(x)) y=(px(y)) width="100%" height="100%" fill=(PAPER.light) {}
+                rect x=(px(x)) y=(px(y)) width="100%" height="100%" fill=(PAPER.hex()) {}
                 (PreEscaped(within))
             }
         };
@@ -237,14 +196,14 @@ impl Canvas {
 
     pub(super) fn text(&mut self, (x, y): Point, Align(anchor, dy): Align, words: &str) {
         let shape =
-            html! { text x=(px(x)) y=(px(y)) text-anchor=(anchor) dy=(dy) fill=(INK.light) { (printable(words)) } };
+            html! { text x=(px(x)) y=(px(y)) text-anchor=(anchor) dy=(dy) fill=(INK.hex()) { (printable(words)) } };
         self.shapes += &shape.into_string();
     }
 
     /// Draws a text that reads upwards.
     pub(super) fn text_upwards(&mut self, (x, y): Point, words: &str) {
         let turned = format!("translate({} {}) rotate(-90)", px(x), px(y));
-        let shape = html! { text transform=(turned) text-anchor="middle" fill=(INK.light) { (words) } };
+        let shape = html! { text transform=(turned) text-anchor="middle" fill=(INK.hex()) { (words) } };
         self.shapes += &shape.into_string();
     }
 
@@ -361,16 +320,6 @@ fn distance(point: Point, from: Point, to: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn pages_have_the_colours_of_files_in_the_light() {
-        let sheet = include_str!("../report/page/style.css").to_lowercase();
-        for colour in [PAPER, INK, SOFT_INK, GRID, OBSTACLE, ALARM].into_iter().chain(PALETTE) {
-            let light = colour.light.to_lowercase();
-            let short = if light == "#ffffff" { "#fff".to_owned() } else { light };
-            assert!(sheet.contains(&format!("{}:light-dark({short},", colour.variable)), "{colour:?}");
-        }
-    }
 
     fn thinned_line(points: &[Point]) -> Vec<Point> {
         thinned(vec![((), points.to_vec())]).remove(0).1

@@ -3,7 +3,8 @@
 use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Mark};
-use super::svg::{INK, PALETTE, Stroke};
+use super::svg::Stroke;
+use crate::drawing::colours::{INK, VEHICLES};
 use tautline_laws::law::EdgeTension;
 
 /// Largest tension in the chart, over alpha.
@@ -27,11 +28,11 @@ pub fn tension_curve(tension: &EdgeTension, title: &str) -> Figure {
 
     let x = Axis::linear("distance l [m]", [0.0, far], false);
     let mut chart = Chart::new(x, Axis::linear("tension V [m²/s²]", [0.0, top], true));
-    chart.line(points, Stroke::solid(PALETTE[0], 1.8), "V(l)");
+    chart.line(points, Stroke::solid(VEHICLES[0], 1.8), "V(l)");
     chart.upright(delta_m, Stroke::solid(INK, 1.6), Some(format!("barrier δ = {delta_m} m")));
     let minimum = format!("minimum at d = {rest_m:.4} m, Vmin = {:.4} m²/s²", tension.minimum());
     let description = format!("Edge tension over distance: unbounded towards {delta_m} m; {minimum}.");
-    chart.marks.push(Mark::ring((rest_m, 0.0), PALETTE[1], Some(minimum)));
+    chart.marks.push(Mark::ring((rest_m, 0.0), VEHICLES[1], Some(minimum)));
     chart.figure("tension", title, &description)
 }
 
@@ -53,7 +54,7 @@ pub fn convergence(steps: &[Step], title: &str) -> Figure {
     let x = Axis::log("step dt [s]", steps.iter().map(|step| step.dt_s));
     let mut chart = Chart::new(x, Axis::log("largest position error [m]", steps.iter().map(|step| step.error_m)));
     let errors = steps.iter().map(|step| (step.dt_s, step.error_m)).collect();
-    chart.line(errors, Stroke::solid(PALETTE[0], 1.8), "position error");
+    chart.line(errors, Stroke::solid(VEHICLES[0], 1.8), "position error");
     if let [first, .., last] = steps {
         let beside_m = ASIDE * first.error_m;
         let points = [first, last].map(|step| (step.dt_s, beside_m * step.dt_s / first.dt_s)).to_vec();

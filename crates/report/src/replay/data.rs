@@ -6,15 +6,15 @@ use serde::Serialize;
 use super::chart::Chart;
 use super::decimate::{MOST_INSTANTS, Span, around_worst, breaks, chosen, place_of_weightiest, present, shown};
 use super::motion::PackedMotion;
-use super::obstacle_meshes::{POINT_BYTES, Thing, ground};
-use super::stage::{Extent, LIMITS, Limits, Rotors, Targets, targets_of, turn_bytes};
+use super::obstacle_meshes::{POINT_BYTES, Thing};
+use super::stage::{Targets, swarm_m, targets_of, turn_bytes};
 use super::statements::{self, Statement, Words};
-use super::viewpoint::Viewpoint;
 use super::{Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles};
+use crate::drawing::rotors::Airframe;
+use crate::drawing::{LIGHT, LIMITS, Limits, Surroundings, TAN_HALF_VIEW, Viewpoint, max_clearance_m};
 use crate::figures::{Figure, at_closest};
 use crate::flight_log::FlightLog;
 use tautline_audit::MovingObstacle;
-use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Rows, row};
 use tautline_sim::plan::Plan;
 
@@ -29,8 +29,6 @@ const SAID_BYTES: usize = 100;
 const MOST_POINTS: usize = 5000;
 /// Relative rounding error of a number in single precision.
 const SINGLE: f64 = 0.5 * f32::EPSILON as f64;
-/// Version of the data.
-const VERSION: u32 = 3;
 
 /// A flight as data of a page.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,8 +61,10 @@ pub struct Replay {
 /// Input of the script. Lists of numbers are base64 of their little-endian bytes.
 #[derive(Default, Serialize)]
 struct Data<'a> {
-    version: u32,
     limits: Limits,
+    /// Tangent of half the vertical angle of view, and the direction of the light in the axes of the camera.
+    tangent: f64,
+    light: [f64; 3],
     /// Names of the drawn vehicles.
     vehicles: Vec<String>,
     /// Drawn radius of each vehicle \[m\].
@@ -79,9 +79,13 @@ struct Data<'a> {
     /// Origin of all drawn positions, and half of the box around everything \[m\].
     origin_m: [f64; 3],
     half_m: [f64; 3],
+    /// Half of the box around all vehicles at any instant and their mean \[m\].
+    swarm_m: [f64; 3],
     /// First view, and whether it shows vehicles as lights.
     viewpoint: Viewpoint,
     lights: bool,
+    /// Clearance with the last colour \[m\].
+    clearance_m: f64,
     /// Side of the squares on the ground, and two corners of the ground relative to the origin \[m\].
     square_m: f64,
     ground: [[f64; 3]; 2],
@@ -94,7 +98,7 @@ struct Data<'a> {
     starts: String,
     steps: String,
     /// Rotors of every vehicle. Attitudes are three signed bytes for each vehicle, instant by instant.
-    rotors: Option<Rotors>,
+    rotors: Option<Airframe>,
     turns: String,
     /// Instants and vehicles, as 16-bit indices: vehicles that were absent at some time since the previous instant.
     breaks: String,
@@ -128,6 +132,13 @@ struct MomentData<'a> {
     said: String,
 }
 
+impl Data<'_> {
+    /// Returns the data without a flight.
+    fn blank() -> Self {
+        Self { limits: LIMITS, tangent: TAN_HALF_VIEW, light: LIGHT, ..Self::default() }
+    }
+}
+
 /// Properties of the judgement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JudgementContext {
@@ -143,7 +154,7 @@ impl Replay {
     /// Returns the JSON of a live view without vehicles, which its page fills.
     pub(crate) fn empty_json() -> String {
         let viewpoint = Viewpoint { azimuth_deg: -60.0, elevation_deg: 30.0, across: None };
-        written(&Data { version: VERSION, limits: LIMITS, decimals: 1, viewpoint, ..Data::default() })
+        written(&Data { decimals: 1, viewpoint, ..Data::blank() })
     }
 
     /// Packs a flight into at most `room_bytes` of JSON.
@@ -174,32 +185,30 @@ impl Replay {
         let nearest = log.nearest();
         let near = nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
         let [near_s, near_who] = statements::pairs(&near, log, place);
-        let extent = Extent::of(stage, log, &shown);
-        let origin_m = place_of_weightiest(log, listed).unwrap_or(extent.middle_m());
-        let level_m = stage.obstacles.iter().find_map(ground_m).unwrap_or(extent.low_m.z);
-        let (square_m, corners) = ground(extent.low_m, extent.high_m, level_m);
+        let around = stage.surroundings(log, &shown);
+        let origin_m = place_of_weightiest(log, listed).unwrap_or(around.middle_m());
         let most_said = MOST_SAID.map(|most| (room_bytes / 10 / SAID_BYTES).clamp(8, most));
         let has_gaps =
             !judged.is_else_known || moments.iter().any(|of| matches!(of.kind, Kind::Undecided | Kind::Unseen));
         let name = |vehicle: usize| stage.vehicles.get(vehicle).map(|name| cut(name, LONGEST_NAME));
         let words = Words { unit: judged.unit, limit: judged.limit, has_gaps, name };
-        let things = obstacle_meshes(stage, &extent, listed, room_bytes);
+        let things = obstacle_meshes(stage, &around, listed, room_bytes);
         let mut data = Data {
-            version: VERSION,
-            limits: LIMITS,
             vehicles: shown.iter().map(|&k| cut(&stage.vehicles[k], LONGEST_NAME)).collect(),
             radius_m: shown.iter().map(|&k| stage.drawn_radius_m(k)).collect(),
             shell_m: stage.shell_m,
             decimals: decimals(end_s - begin_s),
             holds: log.holds,
             origin_m: origin_m.into(),
-            half_m: extent.half_m().into(),
+            half_m: around.half_m().into(),
+            swarm_m: swarm_m(log, &shown).add_scalar(around.around_m).into(),
             viewpoint: stage.viewpoint(log),
             lights: plan.as_ref().is_some_and(Plan::is_show),
-            square_m,
-            ground: corners.map(|corner| (corner - origin_m).into()),
+            clearance_m: max_clearance_m(stage.delta_m(), shown.iter().map(|&k| stage.drawn_radius_m(k))),
+            square_m: around.ground.step_m,
+            ground: around.ground.corners_m.map(|corner| (corner - origin_m).into()),
             points: shown.len() + guides.count(),
-            rotors: stage.rotors,
+            rotors: stage.rotors.map(|rotors| rotors.airframe()),
             near_s,
             near_who,
             nearest: statements::so_far(&nearest, &words, most_said[0]),
@@ -207,7 +216,7 @@ impl Replay {
             moments: in_order(listed).map(|moment| moment.data(&place)).collect(),
             things,
             targets,
-            ..Data::default()
+            ..Data::blank()
         };
         // Breaks take a bounded share of the room. Beyond it, a vehicle that was absent in between is drawn at neither
         // end.
@@ -228,7 +237,7 @@ impl Replay {
             instants[instant][vehicle] = None;
         }
         let motion = PackedMotion::new(&instants);
-        let single_m = SINGLE * (extent.low_m - origin_m).amax().max((extent.high_m - origin_m).amax());
+        let single_m = SINGLE * ((around.middle_m() - origin_m).abs() + around.half_m()).max();
         let rounding_m = motion.rounding_m() + single_m;
         data.times_s = doubles(kept_s.into_iter());
         data.breaks =
@@ -320,12 +329,12 @@ fn in_order(moments: &[Moment]) -> impl Iterator<Item = &Moment> {
 }
 
 /// Returns the obstacles, with their positions at the findings that involve them.
-fn obstacle_meshes(stage: &Stage, extent: &Extent, moments: &[Moment], room_bytes: usize) -> Vec<Thing> {
+fn obstacle_meshes(stage: &Stage, around: &Surroundings, moments: &[Moment], room_bytes: usize) -> Vec<Thing> {
     let most = (room_bytes / 4 / POINT_BYTES / stage.obstacles.len().max(1)).clamp(4, MOST_POINTS);
     let thing = |(k, obstacle): (usize, &MovingObstacle)| {
         let own = moments.iter().filter(|moment| moment.obstacle == Some(k));
         let times_s: Vec<_> = own.map(|moment| moment.span.at_s).collect();
-        Thing::of(obstacle, extent, &times_s, most)
+        Thing::of(obstacle, around, &times_s, most)
     };
     stage.obstacles.iter().enumerate().map(thing).collect()
 }
@@ -361,10 +370,4 @@ fn decimals(span_s: f64) -> usize {
 /// Returns JSON that a page can hold: `<` is escaped.
 fn written(data: &Data<'_>) -> String {
     serde_json::to_string(data).expect("every value has a JSON form").replace('<', "\\u003c")
-}
-
-/// Returns the height of an obstacle that is level ground \[m\].
-fn ground_m(obstacle: &MovingObstacle) -> Option<f64> {
-    let Shape::HalfSpace { normal } = obstacle.shape else { return None };
-    (normal.xy().norm() <= 1e-3 * normal.z).then(|| obstacle.path.first().map(|point| point.1.z)).flatten()
 }

@@ -14,14 +14,11 @@ mod motion;
 mod obstacle_meshes;
 mod stage;
 mod statements;
-mod viewpoint;
 
 pub use chart::Chart;
 pub use data::{JudgementContext, Replay};
 pub use decimate::{MOST_INSTANTS, MOST_VEHICLES, Span, chosen};
-pub use obstacle_meshes::round_step;
-pub use stage::{LIMITS, Limits, MOST_LINKS, Rotors, Stage};
-pub use viewpoint::{Viewpoint, is_between, turns_deg};
+pub use stage::Stage;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;

@@ -1,10 +1,10 @@
-//! Meshes of obstacles and the ground in a page: triangles, lines and paths.
+//! Meshes of obstacles in a page: triangles, lines and paths.
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::stage::Extent;
-use super::{LONGEST_NAME, cut, singles};
+use super::singles;
+use crate::drawing::{Surroundings, box_sides, perpendicular, plane_section};
 use crate::simplify::needed;
 use tautline_audit::MovingObstacle;
 use tautline_core::obstacle::Shape;
@@ -12,7 +12,6 @@ use tautline_core::obstacle::Shape;
 /// An obstacle as data of a page.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Thing {
-    name: String,
     /// Radius of a ball \[m\], which has no triangles.
     radius_m: Option<f64>,
     /// Triangles and lines in single precision, relative to its position \[m\].
@@ -32,9 +31,9 @@ pub(super) const POINT_BYTES: usize = 4 * 26;
 impl Thing {
     /// Returns the data of an obstacle, with a path of about `most` points that includes its positions at `times_s`
     /// \[s\].
-    pub(super) fn of(obstacle: &MovingObstacle, extent: &Extent, times_s: &[f64], most: usize) -> Self {
+    pub(super) fn of(obstacle: &MovingObstacle, around: &Surroundings, times_s: &[f64], most: usize) -> Self {
         let place_m = obstacle.path.first().map_or(Vector3::zeros(), |point| point.1);
-        let mesh = Mesh::of(&obstacle.shape, extent.middle_m() - place_m, 1.5 * extent.reach_m());
+        let mesh = Mesh::of(&obstacle.shape, around.middle_m() - place_m, 1.5 * around.half_m().norm());
         let (kept, off_m) = simplified(&obstacle.path, times_s, most);
         let points = kept.into_iter().map(|k| obstacle.path[k]);
         let (radius_m, opacity) = match obstacle.shape {
@@ -43,7 +42,6 @@ impl Thing {
             Shape::HalfSpace { .. } => (None, 0.14),
         };
         Self {
-            name: cut(&obstacle.name, LONGEST_NAME),
             radius_m,
             solid: singles(&mesh.solid),
             rims: singles(&mesh.rims),
@@ -81,8 +79,6 @@ const TURN: u32 = 24;
 const QUARTER: i32 = 4;
 /// Number of lines across a plane.
 const HATCHES: u32 = 8;
-/// Approximate number of ground squares from the middle of the flight to its end.
-const SQUARES: f64 = 5.0;
 
 /// Triangles, each corner a position and a normal (zero without shading), and lines, each two positions, relative to
 /// the position of the obstacle \[m\].
@@ -98,22 +94,17 @@ impl Mesh {
     pub(super) fn of(shape: &Shape, middle: Vector3<f64>, reach_m: f64) -> Self {
         match *shape {
             Shape::Ball { .. } => Self::default(),
-            Shape::Box { half_m, yaw_deg } => of_box(half_m, yaw_deg.to_radians()),
+            Shape::Box { half_m, yaw_deg } => of_box(half_m, yaw_deg),
             Shape::Capsule { from_m, to_m, radius_m } => of_capsule(from_m, to_m, radius_m),
-            Shape::HalfSpace { normal } => of_plane(normal.normalize(), middle, reach_m),
+            Shape::HalfSpace { normal } => of_plane(plane_section(normal, middle, reach_m)),
         }
     }
 }
 
-fn of_box(half_m: Vector3<f64>, yaw_rad: f64) -> Mesh {
-    let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+fn of_box(half_m: Vector3<f64>, yaw_deg: f64) -> Mesh {
     let mut mesh = Mesh::default();
-    for side in 0..6 {
-        let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
-        let of = |k: usize, share: f64| turned * Vector3::ith(k % 3, half_m[k % 3] * share);
-        let (middle, u, v) = (of(axis, sign), of(axis + 1, 1.0), of(axis + 2, 1.0));
-        let normal = turned * Vector3::ith(axis, sign);
-        mesh.square(middle, u, v, normal);
+    for [middle, u, v] in box_sides(half_m, yaw_deg) {
+        mesh.square(middle, u, v, middle.try_normalize(0.0).unwrap_or_default());
         for end in [-1.0, 1.0] {
             mesh.rims.extend([middle + u * end - v, middle + u * end + v]);
         }
@@ -121,10 +112,7 @@ fn of_box(half_m: Vector3<f64>, yaw_rad: f64) -> Mesh {
     mesh
 }
 
-fn of_plane(normal: Vector3<f64>, middle: Vector3<f64>, reach_m: f64) -> Mesh {
-    let foot = middle - normal * middle.dot(&normal);
-    let u = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize() * reach_m;
-    let v = normal.cross(&u);
+fn of_plane([foot, u, v]: [Vector3<f64>; 3]) -> Mesh {
     let mut mesh = Mesh::default();
     mesh.square(foot, u, v, Vector3::zeros());
     for k in 0..=HATCHES {
@@ -136,8 +124,7 @@ fn of_plane(normal: Vector3<f64>, middle: Vector3<f64>, reach_m: f64) -> Mesh {
 
 fn of_capsule(from_m: Vector3<f64>, to_m: Vector3<f64>, radius_m: f64) -> Mesh {
     let along = (to_m - from_m).try_normalize(0.0).unwrap_or(Vector3::z());
-    let u = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
-    let v = along.cross(&u);
+    let [u, v] = perpendicular(along);
     let rings: Vec<_> =
         (-QUARTER..=0).map(|lift| (from_m, lift)).chain((0..=QUARTER).map(|lift| (to_m, lift))).collect();
     let corner = |(end, lift): (Vector3<f64>, i32), turn: u32| {
@@ -164,26 +151,10 @@ impl Mesh {
     }
 }
 
-/// Returns the side and two corners of the squares on the ground at a height \[m\], below everything between two
-/// corners \[m\].
-pub(super) fn ground(low: Vector3<f64>, high: Vector3<f64>, height_m: f64) -> (f64, [Vector3<f64>; 2]) {
-    let side_m = round_step((0.5 * (high - low)).xy().amax() / SQUARES);
-    let cells = [(low / side_m).map(|x| x.floor() - 1.0), (high / side_m).map(|x| x.ceil() + 1.0)];
-    (side_m, cells.map(|cells| Vector3::new(cells.x * side_m, cells.y * side_m, height_m)))
-}
-
-/// Returns the smallest of 1, 2 and 5 times a power of ten at or above a length; 1 for an invalid length.
-#[must_use]
-pub fn round_step(length_m: f64) -> f64 {
-    if !(length_m > 0.0 && length_m.is_finite()) {
-        return 1.0;
-    }
-    let power = 10.0_f64.powf(length_m.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|&step| step >= length_m).unwrap_or(power)
-}
-
 #[cfg(test)]
 mod tests {
+    use nalgebra::Rotation3;
+
     use super::*;
 
     #[test]
@@ -243,24 +214,5 @@ mod tests {
             }
             assert!(mesh.rims.iter().all(|at| off(at).abs() < 1e-9));
         }
-    }
-
-    #[test]
-    fn ground_squares_cover_the_box_in_moderate_number() {
-        for reach_m in [1e-3, 0.7, 3.0, 49.0, 1e6] {
-            let (low, high) = (Vector3::repeat(-reach_m), Vector3::new(reach_m, 0.5 * reach_m, 0.0));
-            let (side_m, [least, most]) = ground(low, high, -1.0);
-            assert!(most.x >= high.x && most.y >= high.y && least.x <= low.x && least.y <= low.y);
-            assert_eq!((least.z, most.z), (-1.0, -1.0));
-            let lines = ((most - least) / side_m).xy().add_scalar(1.0).sum();
-            assert!((10.0..60.0).contains(&lines), "{side_m} m: {lines} lines");
-        }
-    }
-
-    #[test]
-    fn ground_steps_are_round_numbers() {
-        let steps = [0.9, 1.0, 1.1, 3.0, 7.0, 0.03, 1234.0].map(round_step);
-        assert_eq!(steps, [1.0, 1.0, 2.0, 5.0, 10.0, 0.05, 2000.0]);
-        assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(round_step), [1.0; 4]);
     }
 }

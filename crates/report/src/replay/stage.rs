@@ -1,12 +1,12 @@
-//! Contents of a replay besides motion: vehicles, obstacles, links and slots, and the box around everything.
+//! Contents of a replay besides motion: vehicles, obstacles, links and slots.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Serialize;
 
-use super::{Viewpoint, base64_of, singles};
+use super::{base64_of, singles};
+use crate::drawing::{MOST_LINKS, Rotors, Surroundings, UNKNOWN_RADIUS_M, Viewpoint, link_look};
 use crate::flight_log::FlightLog;
 use tautline_audit::MovingObstacle;
-use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Rows, mean_row, row};
 use tautline_laws::formation::Formation;
 use tautline_sim::plan::Plan;
@@ -29,52 +29,19 @@ pub struct Stage {
     pub obstacles: Vec<MovingObstacle>,
 }
 
-/// Rotors of a quadrotor.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Rotors {
-    /// Centres relative to the centre of the body, x ahead and y to the left \[m\].
-    pub at_m: [[f64; 2]; 4],
-    /// Radius of each rotor \[m\].
-    pub radius_m: f64,
-}
+/// Smallest radius around a vehicle \[m\].
+const LEAST_M: f64 = 1e-6;
 
-/// Distance of the rotors from the centre, and their radius, over the radius of the hull, for an unknown model.
-const ARM: f64 = 0.66;
-const ROTOR: f64 = 0.33;
-
-impl Rotors {
-    /// Returns the rotors of a scenario's model, if its vehicles are quadrotors.
-    #[must_use]
-    pub fn of(scenario: &Scenario) -> Option<Self> {
-        let model = &scenario.airframe.quadrotor()?.model;
-        Some(Self { at_m: model.rotor_positions_m, radius_m: model.rotor_radius_m })
+/// Returns the largest distance of a vehicle from the mean of all at an instant, along each axis \[m\].
+pub(super) fn swarm_m(log: &FlightLog, shown: &[usize]) -> Vector3<f64> {
+    let mut swarm_m = Vector3::zeros();
+    for keyframe in log.keyframes() {
+        let places = shown.iter().map(|&vehicle| row(&keyframe.positions_m, vehicle));
+        let places: Vec<_> = places.filter(|at| at.iter().all(|x| x.is_finite())).collect();
+        let mean = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
+        swarm_m = places.iter().fold(swarm_m, |most, at| most.sup(&(at - mean).abs()));
     }
-
-    /// Creates four rotors within a hull of this radius \[m\].
-    #[must_use]
-    pub fn within(hull_radius_m: f64) -> Self {
-        let out = hull_radius_m * ARM * std::f64::consts::FRAC_1_SQRT_2;
-        let at_m = [[1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]].map(|at: [f64; 2]| at.map(|side| side * out));
-        Self { at_m, radius_m: hull_radius_m * ROTOR }
-    }
-
-    /// Returns the rotors at another scale.
-    #[must_use]
-    pub fn scaled(&self, scale: f64) -> Self {
-        Self { at_m: self.at_m.map(|at| at.map(|side| side * scale)), radius_m: self.radius_m * scale }
-    }
-
-    /// Returns the centres of the rotors at a height above the centre of the body \[m\].
-    #[must_use]
-    pub fn places_m(&self, above_m: f64) -> [Vector3<f64>; 4] {
-        self.at_m.map(|[x, y]| Vector3::new(x, y, above_m))
-    }
-
-    /// Returns the distance of the outermost rotor from the centre \[m\].
-    #[must_use]
-    pub fn arm_m(&self) -> f64 {
-        self.places_m(0.0).iter().map(Vector3::norm).fold(0.0, f64::max)
-    }
+    swarm_m
 }
 
 /// Returns the attitudes of some vehicles as three signed bytes each: the vector part of the quaternion with a positive
@@ -90,15 +57,17 @@ pub(super) fn turn_bytes(attitudes: &[Option<UnitQuaternion<f64>>], shown: &[usi
     shown.iter().flat_map(turn).collect()
 }
 
-/// Largest drawn radius of a vehicle with unknown radius \[m\].
-const UNKNOWN_RADIUS_M: f64 = 0.1;
-
 impl Stage {
     /// Returns formations and graph, with the changes of the target during the flight.
     pub(super) fn plan_of(&self, log: &FlightLog) -> Option<Plan> {
         let mut plan = self.plan.clone()?;
         log.targets().iter().for_each(|event| plan.note(event));
         Some(plan)
+    }
+
+    /// Returns the safety distance \[m\], in horizontal lengths.
+    pub(super) fn delta_m(&self) -> Option<f64> {
+        self.shell_m.map(|[half_m, ..]| 2.0 * half_m)
     }
 
     /// Returns the drawn radius of a vehicle with unknown radius \[m\]. Two vehicles at their limit do not touch.
@@ -120,6 +89,18 @@ impl Stage {
         Viewpoint::of(&[log], &obstacles.map(|of| (of.shape, of.path[0].1)).collect::<Vec<_>>())
     }
 
+    /// Returns the surroundings of the drawn vehicles with their shells.
+    pub(super) fn surroundings(&self, log: &FlightLog, shown: &[usize]) -> Surroundings {
+        let places =
+            log.keyframes().iter().flat_map(|at| shown.iter().map(move |&vehicle| row(&at.positions_m, vehicle)));
+        let places = places.filter(|at| at.iter().all(|x| x.is_finite())).map(|at| [at; 2]);
+        let flown_m = places.reduce(|[low, high], [at, _]| [low.inf(&at), high.sup(&at)]);
+        let radii = shown.iter().map(|&vehicle| self.drawn_radius_m(vehicle));
+        let around_m = radii.chain(self.shell_m.into_iter().flatten()).fold(LEAST_M, f64::max);
+        let obstacles = self.obstacles.iter().flat_map(|of| of.path.iter().map(|&(_, at_m)| (of.shape, at_m)));
+        Surroundings::of(flown_m, around_m, &obstacles.collect::<Vec<_>>())
+    }
+
     pub(super) fn drawn_radius_m(&self, vehicle: usize) -> f64 {
         self.radius_m.get(vehicle).copied().flatten().unwrap_or_else(|| self.unknown_radius_m())
     }
@@ -138,94 +119,13 @@ impl Stage {
     }
 }
 
-/// Smallest half edge of the box \[m\].
-const LEAST_M: f64 = 1e-6;
-
-/// A box around a flight with the shells, and with obstacles that are not far larger than the flight.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Extent {
-    pub(super) low_m: Vector3<f64>,
-    pub(super) high_m: Vector3<f64>,
-}
-
-impl Extent {
-    /// Returns the box of the drawn vehicles.
-    pub(super) fn of(stage: &Stage, log: &FlightLog, shown: &[usize]) -> Self {
-        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        let places =
-            log.keyframes().iter().flat_map(|at| shown.iter().map(move |&vehicle| row(&at.positions_m, vehicle)));
-        for at in places.filter(|at| at.iter().all(|x| x.is_finite())) {
-            (low, high) = (low.inf(&at), high.sup(&at));
-        }
-        if low.x > high.x {
-            (low, high) = (Vector3::zeros(), Vector3::zeros());
-        }
-        let radii = shown.iter().map(|&vehicle| stage.drawn_radius_m(vehicle));
-        let around_m = radii.chain(stage.shell_m.into_iter().flatten()).fold(LEAST_M, f64::max);
-        (low, high) = (low.add_scalar(-around_m), high.add_scalar(around_m));
-        let (size_m, middle) = ((high - low).norm(), 0.5 * (low + high));
-        for (least, most) in stage.obstacles.iter().flat_map(boxes) {
-            if (least - middle).amax().max((most - middle).amax()) < 2.0 * size_m {
-                (low, high) = (low.inf(&least), high.sup(&most));
-            }
-        }
-        Self { low_m: low, high_m: high }
-    }
-
-    pub(super) fn middle_m(&self) -> Vector3<f64> {
-        0.5 * (self.low_m + self.high_m)
-    }
-
-    pub(super) fn half_m(&self) -> Vector3<f64> {
-        0.5 * (self.high_m - self.low_m)
-    }
-
-    pub(super) fn reach_m(&self) -> f64 {
-        self.half_m().norm()
-    }
-}
-
-/// Returns a box around an obstacle at each point of its path; empty for an unbounded obstacle.
-fn boxes(obstacle: &MovingObstacle) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-    let (low, high) = match obstacle.shape {
-        Shape::Ball { radius_m } => (Vector3::repeat(-radius_m), Vector3::repeat(radius_m)),
-        Shape::Box { half_m, .. } => (Vector3::repeat(-half_m.norm()), Vector3::repeat(half_m.norm())),
-        Shape::Capsule { from_m, to_m, radius_m } => {
-            (from_m.inf(&to_m).add_scalar(-radius_m), from_m.sup(&to_m).add_scalar(radius_m))
-        }
-        Shape::HalfSpace { .. } => return Vec::new(),
-    };
-    obstacle.path.iter().map(|(_, at)| (at + low, at + high)).collect()
-}
-
-/// Largest number of drawn links. More links would hide each other.
-pub const MOST_LINKS: usize = 2100;
-
-/// Numbers up to which parts of a drawing are shown. More would hide the formation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Limits {
-    /// Vehicles that all have names. Of more, only important ones have.
-    pub named: usize,
-    /// Vehicles with trails of the whole flight, and with trails of 5 s. More have trails of 1 s.
-    pub trails: [usize; 2],
-    /// Vehicles with lines to the ground.
-    pub drops: usize,
-    /// Vehicles with slots at first.
-    pub slots: usize,
-    /// Links that are shown at first.
-    pub links: usize,
-    /// Vehicles with colours of their own. More have one colour.
-    pub colours: usize,
-}
-
-/// Limits of pictures and replays.
-pub const LIMITS: Limits = Limits { named: 24, trails: [24, 99], drops: 300, slots: 60, links: 40, colours: 199 };
-
 /// Links of the graph, and the slots of the vehicles.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Targets {
     /// Indices in the list of vehicles, two 16-bit numbers for a link.
     links: String,
+    /// Width of a link \[px\], and its opacity at rest.
+    link_look: (f32, f32),
     /// Whether links have an edge tension with its barrier at `delta_m`; otherwise they are springs.
     tension: bool,
     delta_m: f64,
@@ -276,6 +176,7 @@ pub(super) fn targets_of(plan: Option<&Plan>, shown: &[usize], begin_s: f64, roo
     let guides = Guides { axis_m, reference: plan.reference_at(begin_s).is_some() };
     let targets = Targets {
         links: base64_of(links.iter().flat_map(|at| at.to_le_bytes())),
+        link_look: link_look(links.len() / 2),
         tension: plan.has_tension(),
         delta_m: plan.delta_m(),
         formations: formations

@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, PreEscaped, html};
 
-use super::{POLICY, STYLE, metadata, replay, theme_choice};
+use super::{POLICY, metadata, replay, style, theme_choice};
 use crate::replay::Replay;
 
 /// Rules of the band with the state, and of the lists.
@@ -19,7 +19,7 @@ pub fn live_page() -> String {
             head {
                 (metadata(&policy))
                 title { "Live watch" }
-                style { (PreEscaped(STYLE)) (PreEscaped(replay::STYLE)) (PreEscaped(LIVE_STYLE)) }
+                style { (PreEscaped(style())) (PreEscaped(replay::STYLE)) (PreEscaped(LIVE_STYLE)) }
             }
             body {
                 header {

@@ -19,10 +19,11 @@ use maud::{DOCTYPE, PreEscaped, html};
 pub use maud::{Markup, Render};
 pub use replay::{Start, replay};
 
-use crate::figures::{Figure, page_rules};
+use crate::drawing::colours;
+use crate::figures::Figure;
 use tautline_core::text::in_order;
 
-/// Style sheet with the colours of light and dark pages.
+/// Style sheet of pages.
 const STYLE: &str = include_str!("style.css");
 /// Content security policy: no loading. A script is admitted by its hash, on pages with a replay only.
 const POLICY: &str =
@@ -31,6 +32,11 @@ const POLICY: &str =
 /// Sentence below the heading of a replay.
 const ABOUT_REPLAY: &str =
     "Replay of the flight. Play starts the replay, dragging turns the view, and the button ? lists all keys.";
+
+/// Returns the style sheet of pages, with the colours of drawings on light and dark pages.
+fn style() -> String {
+    colours::variables() + STYLE
+}
 
 /// A page.
 #[derive(Clone, Debug)]
@@ -126,7 +132,7 @@ impl Page {
                 head {
                     (metadata(&policy))
                     title { (self.title) " - " (self.badge.word) }
-                    style { (PreEscaped(STYLE)) (PreEscaped(page_rules())) @if replays { (PreEscaped(replay::STYLE)) } }
+                    style { (PreEscaped(style())) (PreEscaped(colours::figure_rules())) @if replays { (PreEscaped(replay::STYLE)) } }
                 }
                 body {
                     header {
