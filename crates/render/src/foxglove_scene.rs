@@ -107,7 +107,7 @@ impl FoxgloveScene {
         SceneUpdate { deletions: Vec::new(), entities: vec![entity] }
     }
 
-    /// Returns the edges in the colour of their tension, unless there are none or too many.
+    /// Returns the edges in the colour of their tension; `None` without edges, or for too many.
     fn edges(&self, positions_m: &Rows, time_s: f64) -> Option<LinePrimitive> {
         let plan = self.timeline.plan.as_ref().filter(|plan| (1..=MAX_EDGES).contains(&plan.graph.edge_count()))?;
         let (mut points, mut colors) = (Vec::new(), Vec::new());
@@ -339,14 +339,13 @@ mod tests {
         let front = |entity: &SceneEntity| entity.cylinders[0].pose.expect("a pose");
         let (position, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
         // A vehicle that flies ahead tilts its front down.
-        let x = Rotors::within(0.25).at_m[0][0];
-        assert!(
-            (position.x - place.x - x * 0.4_f64.cos()).abs() < 1e-12
-                && (position.z - place.z + x * 0.4_f64.sin()).abs() < 1e-12
-        );
+        let at = Rotors::within(0.25).places_m()[0];
+        let (sin, cos) = 0.4_f64.sin_cos();
+        assert!((position.x - place.x - at.x * cos - at.z * sin).abs() < 1e-12);
+        assert!((position.z - place.z + at.x * sin - at.z * cos).abs() < 1e-12);
         assert!((turn.y - 0.2_f64.sin()).abs() < 1e-12 && (turn.w - 0.2_f64.cos()).abs() < 1e-12);
         let (level, place, _) = entity(2, 0.0);
-        assert_eq!(front(&level).position.map(|position| position.z), Some(place.z));
+        assert_eq!(front(&level).position.map(|position| position.z), Some(place.z + at.z));
         let (many, ..) = entity(MAX_QUADROTORS + 1, 0.4);
         assert_eq!((many.spheres.len(), many.cylinders.len()), (2 * (MAX_QUADROTORS + 1), 0));
     }

@@ -1,7 +1,7 @@
 //! Rendering of scenes on the processor, for machines without a graphics adapter.
 //!
-//! The pictures follow `shaders/scene.wgsl`: four samples per pixel, blending in linear light. Bands of rows are drawn in
-//! parallel.
+//! The pictures follow `shaders/scene.wgsl`: four samples per pixel, blending in linear light. Bands of rows are drawn
+//! in parallel.
 
 use std::ops::Range;
 
@@ -125,6 +125,13 @@ impl ViewSpace {
         }
     }
 
+    /// Returns the point of a plane at a point of the picture, relative to the plane's centre, and its depth \[m\].
+    fn on_plane(&self, [x, y]: [f32; 2], centre: Vec3, normal: Vec3) -> (Vec3, f32) {
+        let [origin, direction] = self.ray(x, y);
+        let point = origin + direction * ((centre - origin).dot(&normal) / direction.dot(&normal));
+        (point - centre, -point.z)
+    }
+
     /// Projects a point ahead of the camera \[pixels\].
     fn project(&self, point: Vec3) -> Vector2<f32> {
         let scale = if self.is_perspective { -1.0 / point.z } else { 1.0 };
@@ -134,26 +141,22 @@ impl ViewSpace {
 
     /// Returns a rectangle around a ball, from the left and the top \[pixels\]; `None` outside of the picture.
     fn around(&self, centre: Vec3, radius_m: f32) -> Option<[[f32; 2]; 2]> {
-        let whole = [[0.0, 0.0], self.size_px];
         let depth_m = -centre.z;
-        if !self.is_perspective {
-            let centre_px = self.project(centre);
-            let reach = radius_m / self.half[1] * self.size_px[1] / 2.0 + 1.0;
-            return Some([[centre_px.x - reach, centre_px.y - reach], [centre_px.x + reach, centre_px.y + reach]]);
-        }
-        if depth_m <= -radius_m {
+        let half = if !self.is_perspective {
+            radius_m
+        } else if depth_m <= -radius_m {
             return None;
-        }
-        if depth_m <= 1.001 * radius_m {
-            return Some(whole);
-        }
+        } else if depth_m <= 1.001 * radius_m {
+            return Some([[0.0, 0.0], self.size_px]);
+        } else {
+            // Bound of the ellipse as which a ball appears, from the tangent cone of its distance and direction.
+            let sine = radius_m / centre.norm().max(depth_m);
+            let stretch = 1.0 / (1.0 - (radius_m / depth_m).powi(2)).max(1e-4);
+            let aside = centre.xy().norm() / depth_m;
+            sine / (1.0 - sine * sine).max(1e-4).sqrt() * (1.0 + aside * aside) * stretch
+        };
         let centre_px = self.project(centre);
-        // Bound of the ellipse as which a ball appears, from the tangent cone of its distance and direction.
-        let sine = radius_m / centre.norm().max(depth_m);
-        let stretch = 1.0 / (1.0 - (radius_m / depth_m).powi(2)).max(1e-4);
-        let aside = centre.xy().norm() / depth_m;
-        let tangent = sine / (1.0 - sine * sine).max(1e-4).sqrt() * (1.0 + aside * aside) * stretch;
-        let reach = tangent / self.half[1] * self.size_px[1] / 2.0 + 1.0;
+        let reach = half / self.half[1] * self.size_px[1] / 2.0 + 1.0;
         Some([[centre_px.x - reach, centre_px.y - reach], [centre_px.x + reach, centre_px.y + reach]])
     }
 
@@ -241,6 +244,11 @@ impl<'a> Band<'a> {
         }
     }
 
+    /// Returns whether a point at a depth is ahead of the camera and of what is drawn.
+    fn shows(&self, sample: usize, depth_m: f32) -> bool {
+        depth_m < self.depths_m[sample] && (!self.view.is_perspective || depth_m > 0.0)
+    }
+
     fn blend(&mut self, sample: usize, [red, green, blue, opacity]: [f32; 4]) {
         for (under, over) in self.colours[sample].iter_mut().zip([red, green, blue]) {
             *under += (over - *under) * opacity;
@@ -274,12 +282,10 @@ impl<'a> Band<'a> {
         let Some(around) = view.around(centre, (squared[0] + squared[1]).sqrt()) else { return };
         let [red, green, blue, _] = face.colour.linear();
         self.visit(around, |band, sample, [x, y]| {
-            let [origin, direction] = view.ray(x, y);
-            let point = origin + direction * ((centre - origin).dot(&normal) / direction.dot(&normal));
-            let offset = point - centre;
+            let (offset, depth_m) = view.on_plane([x, y], centre, normal);
             let is_inside = (0..2).all(|k| offset.dot(&half[k]).abs() <= squared[k]);
-            if is_inside && -point.z < band.depths_m[sample] && (!view.is_perspective || point.z < 0.0) {
-                band.depths_m[sample] = -point.z;
+            if is_inside && band.shows(sample, depth_m) {
+                band.depths_m[sample] = depth_m;
                 band.colours[sample] = [red, green, blue];
             }
         });
@@ -305,10 +311,9 @@ impl<'a> Band<'a> {
         let Some(around) = view.around(centre, disc.radius_m) else { return };
         let [red, green, blue, opacity] = disc.colour.linear();
         self.visit(around, |band, sample, [x, y]| {
-            let [origin, direction] = view.ray(x, y);
-            let point = origin + direction * ((centre - origin).dot(&normal) / direction.dot(&normal));
-            let out = (point - centre).norm() / disc.radius_m;
-            if out <= 1.0 && -point.z < band.depths_m[sample] && (!view.is_perspective || point.z < 0.0) {
+            let (offset, depth_m) = view.on_plane([x, y], centre, normal);
+            let out = offset.norm() / disc.radius_m;
+            if out <= 1.0 && band.shows(sample, depth_m) {
                 let rim = ((out - 0.86) / 0.14).clamp(0.0, 1.0);
                 let rim = rim * rim * (3.0 - 2.0 * rim);
                 let faded = (1.0 - out) * (1.0 - out);

@@ -97,8 +97,8 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Draws a banner for a current violation, of two vehicles before one of an obstacle, and a frame around the picture;
-    /// returns the top of the caption.
+    /// Draws a banner for a current violation, and a frame around the picture; returns the top of the caption. A
+    /// violation of two vehicles comes before one of an obstacle.
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
         let (long, short, count) = if let Some(&(violation, distance_m)) = self.violated.first() {
             let Violation { min_m, min_at_s, limit_m, .. } = violation;

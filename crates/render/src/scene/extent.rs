@@ -171,27 +171,22 @@ impl Extent {
         let area = view.area(self.has_violations);
         let camera = match &view.camera {
             CameraSpec::Auto => self.overview(self.auto, frame, area),
-            CameraSpec::Perspective => self.framing(self.oblique, area),
-            CameraSpec::Top => self.framing(Direction::TOP, area),
-            CameraSpec::Front => self.framing(Direction::FRONT, area),
-            CameraSpec::Side => self.framing(Direction::SIDE, area),
+            CameraSpec::Perspective => self.framing(self.oblique, &[], area),
+            CameraSpec::Top => self.framing(Direction::TOP, &[], area),
+            CameraSpec::Front => self.framing(Direction::FRONT, &[], area),
+            CameraSpec::Side => self.framing(Direction::SIDE, &[], area),
             CameraSpec::Orbit(orbit) => Camera::orbiting(*orbit, Vector3::zeros(), view.size_px),
             CameraSpec::Follow(Some(name)) => {
                 let vehicle = find(timeline, name)?;
                 let radius_m = FOLLOWED_RADII * timeline.radius_m[vehicle];
                 let around_m = timeline.delta_m.map_or(radius_m, |delta_m| FOLLOWED_DELTAS * delta_m);
-                match self.place(&frame.positions_m, vehicle) {
-                    Some(place) => Camera::framing(self.auto, &[(place, around_m)], area),
-                    None => self.framing(self.auto, area),
-                }
+                let place = self.place(&frame.positions_m, vehicle).map(|place| (place, around_m));
+                self.framing(self.auto, place.as_slice(), area)
             }
-            CameraSpec::Follow(None) => match self.swarm_at(frame.time_s) {
-                Some(corners) => Camera::framing(self.auto, &corners, area),
-                None => self.framing(self.auto, area),
-            },
+            CameraSpec::Follow(None) => self.framing(self.auto, &self.swarm_at(frame.time_s), area),
             CameraSpec::Closest => match frame.nearest {
                 Some((pair, _)) => self.close_up(timeline, frame, pair, view),
-                None => self.framing(self.auto, area),
+                None => self.framing(self.auto, &[], area),
             },
         };
         Ok(camera.adjusted(&view.adjustment))
@@ -244,36 +239,36 @@ impl Extent {
 
     /// Returns a camera in a direction that frames the flight, or the swarm if it travels far.
     fn overview(&self, direction: Direction, frame: &Frame, area: Area) -> Camera {
-        match self.swarm_at(frame.time_s).filter(|_| self.travels) {
-            Some(corners) => Camera::framing(direction, &corners, area),
-            None => self.framing(direction, area),
-        }
+        let swarm = if self.travels { self.swarm_at(frame.time_s) } else { Vec::new() };
+        self.framing(direction, &swarm, area)
     }
 
     /// Returns a camera near a pair, or one that frames the flight if a vehicle of the pair is absent.
     pub(crate) fn close_up(&self, timeline: &Timeline, frame: &Frame, pair: Pair, view: &View) -> Camera {
         let area = view.area(self.has_violations);
         let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&frame.positions_m, k));
-        let (Some(first), Some(second)) = (first, second) else { return self.framing(self.auto, area) };
+        let (Some(first), Some(second)) = (first, second) else { return self.framing(self.auto, &[], area) };
         let distance_m = (second - first).norm();
         // The hulls of two vehicles at one position are visible too, for any delta.
         let keep_out_m = 2.0 * timeline.keep_out_m(pair.first()).max(timeline.keep_out_m(pair.second()));
         let ball = ((first + second) / 2.0, CLOSEST_DISTANCES * distance_m.max(keep_out_m));
-        Camera::framing(self.auto, &[ball], area)
+        self.framing(self.auto, &[ball], area)
     }
 
-    fn framing(&self, direction: Direction, area: Area) -> Camera {
-        Camera::framing(direction, &self.balls, area)
+    /// Returns a camera that frames these balls, or the flight without any ball.
+    fn framing(&self, direction: Direction, balls: &[(Vector3<f64>, f64)], area: Area) -> Camera {
+        Camera::framing(direction, if balls.is_empty() { &self.balls } else { balls }, area)
     }
 
     /// Returns the corners of the box around all vehicles at a time \[s\].
-    fn swarm_at(&self, time_s: f64) -> Option<[(Vector3<f64>, f64); 8]> {
+    fn swarm_at(&self, time_s: f64) -> Vec<(Vector3<f64>, f64)> {
         let next = self.swarm.partition_point(|around| around.time_s <= time_s);
-        let (from, to) = (self.swarm.get(next.saturating_sub(1))?, self.swarm.get(next).or(self.swarm.last())?);
+        let (from, to) = (self.swarm.get(next.saturating_sub(1)), self.swarm.get(next).or(self.swarm.last()));
+        let (Some(from), Some(to)) = (from, to) else { return Vec::new() };
         let span_s = to.time_s - from.time_s;
         let part = if span_s > 0.0 { ((time_s - from.time_s) / span_s).clamp(0.0, 1.0) } else { 0.0 };
         let (centre, half) = (from.centre.lerp(&to.centre, part), from.half.lerp(&to.half, part));
-        Some(box_corners([centre - half, centre + half]).map(|corner| (corner, 0.0)))
+        box_corners([centre - half, centre + half]).map(|corner| (corner, 0.0)).to_vec()
     }
 
     /// Returns the smallest and largest depth of the content for a camera \[m\].

@@ -373,7 +373,7 @@ fn heights_are_shown_unless_the_camera_looks_straight_down() {
     let only = |text: &str, ground| View { layers: Layers { ground, ..Layers::NONE }, ..camera(text) };
     let drawn = scene(&timeline, 0.0, &only("perspective", true));
     let feet: Vec<_> = drawn.discs.iter().map(|disc| disc.centre_m).collect();
-    let ground_m = Extent::of(&timeline).ground_m[0].z;
+    let ground_m = Extent::of(&timeline).ground.corners_m[0].z;
     assert_eq!(feet.len(), 4);
     for (ball, foot) in drawn.balls.iter().zip(&feet) {
         assert_eq!((ball.centre_m[0], ball.centre_m[1]), (foot[0], foot[1]));
@@ -555,7 +555,7 @@ fn the_scale_is_below_the_ground_edge_on_and_its_last_number_has_the_unit() {
     }
     let layers = Layers { ground: true, ..Layers::NONE };
     let front = scene(&timeline, 2.0, &View { layers, ..camera("front") });
-    let ground = front.camera.project(Extent::of(&timeline).ground_m[0]).expect("ahead").at_px[1];
+    let ground = front.camera.project(Extent::of(&timeline).ground.corners_m[0]).expect("ahead").at_px[1];
     let numbers = front.annotations.iter().filter_map(|annotation| match annotation {
         Annotation::Words { at_px, anchor: [0.5, 0.5], text, .. }
             if text.trim_end_matches(" m").parse::<f64>().is_ok() =>

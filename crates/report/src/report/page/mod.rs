@@ -132,7 +132,10 @@ impl Page {
                 head {
                     (metadata(&policy))
                     title { (self.title) " - " (self.badge.word) }
-                    style { (PreEscaped(style())) (PreEscaped(colours::figure_rules())) @if replays { (PreEscaped(replay::STYLE)) } }
+                    style {
+                        (PreEscaped(style())) (PreEscaped(colours::figure_rules()))
+                        @if replays { (PreEscaped(replay::STYLE)) }
+                    }
                 }
                 body {
                     header {
