@@ -33,7 +33,8 @@
  *   viewpoint: {azimuth_deg: number, elevation_deg: number, across: number | null},
  *   points: number, starts: Packed,
  *   steps: Packed, breaks: Packed, near_s: Packed, near_who: Packed, holds: boolean, nearest: [number, string][],
- *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: number[][], square_m: number,
+ *   verdicts: Verdict[], follows: boolean, decimals: number, moments: Moment[], things: Thing[],
+ *   ground: number[][], square_m: number,
  *   clearance_m: number, rotors: {ends_m: number[][], rotor_m: number, body_m: number, arm_m: number} | null,
  *   turns: Packed, links: Packed, link_look: [number, number], tension: boolean,
  *   delta_m: number, lights: boolean, formations: {from_s: number, slots: Packed}[], axis_m: number,
@@ -976,7 +977,7 @@ const play = (root, data) => {
   themed();
   look(from.across === null ? 0 : 3 - from.across);
   // The camera follows lights, and a swarm that travels far.
-  if (data.lights || close() < 0.5 * distance) [follow.value, distance] = ["swarm", close()];
+  if (data.lights || data.follows) [follow.value, distance] = ["swarm", close()];
   return {
     root, draw,
     /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */

@@ -26,8 +26,6 @@ const SMOOTHED: f64 = 0.04;
 const FOLLOWED_TIMES: usize = 2000;
 /// Smallest depth that is drawn, in units of the largest: centimetres in a flight of tens of kilometres.
 const NEAREST: f64 = 1e-6;
-/// Largest size of a swarm that the camera `Auto` follows, relative to the extent of its flight.
-const TRAVELLING: f64 = 0.4;
 
 /// Box around all vehicles at a time.
 #[derive(Clone, Copy, Debug)]
@@ -105,11 +103,9 @@ impl Extent {
         }
         swarm.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         let largest = balls.iter().fold(0.0_f64, |largest, (_, radius)| largest.max(*radius));
-        let flown = bounds(&balls);
-        let flown_m = flown.map_or(0.0, |[low, high]| (high / 2.0 - low / 2.0).norm());
         let obstacles = timelines.iter().flat_map(|timeline| &timeline.plan).flat_map(|plan| &plan.obstacles);
         let solids: Vec<_> = obstacles.map(|obstacle| (obstacle.shape, obstacle.place_m)).collect();
-        let around = Surroundings::of(flown, largest, &solids);
+        let around = Surroundings::of(bounds(&balls), largest, &solids);
         let origin_m = around.middle_m();
         balls.extend(around.obstacles_m.iter().map(|corner| (*corner, 0.0)));
         for (place, _) in &mut balls {
@@ -130,7 +126,7 @@ impl Extent {
         let boxes = boxes.filter_map(|(shape, at_m)| Some((box_corners(shape_bounds(shape)?), at_m - origin_m)));
         let swarm = smoothed(&swarm);
         let largest_m = swarm.iter().map(|around| around.half.norm()).fold(0.0, f64::max);
-        let travels = largest_m < TRAVELLING * flown_m;
+        let travels = around.is_far_for(largest_m);
         Self {
             origin_m,
             balls,

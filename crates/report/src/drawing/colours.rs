@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn colours_are_interpolated_and_clamped() {
-        let grey = |part| mixed(&[0x00_00_00, 0x64_64_64, 0xFF_FF_FF], part)[0];
-        assert_eq!([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0].map(grey), [0, 0, 50, 100, 255, 255]);
+        let grey = |part| mixed(&[0x00_00_00, 0x33_33_33, 0xFF_FF_FF], part)[0];
+        assert_eq!([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0].map(grey), [0, 0, 26, 51, 255, 255]);
     }
 }

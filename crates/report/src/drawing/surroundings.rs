@@ -12,6 +12,8 @@ const OBSTACLE_ROOM: f64 = 0.2;
 const NEAR_GROUND: f64 = 0.3;
 /// Approximate number of lines on the ground along the longer side.
 const GROUND_LINES: f64 = 12.0;
+/// Largest size of a swarm that a camera follows, relative to the extent of its flight.
+const TRAVELLING: f64 = 0.4;
 /// Radius around a flight without vehicles \[m\].
 const NO_RADIUS_M: f64 = 1.0;
 
@@ -22,6 +24,8 @@ pub struct Surroundings {
     pub box_m: [Vector3<f64>; 2],
     /// Largest radius around a vehicle \[m\].
     pub around_m: f64,
+    /// Half the diagonal of the box around vehicles' centres \[m\].
+    flown_m: f64,
     /// Corners around each bounded obstacle, moved into the room around the flight \[m\].
     pub obstacles_m: Vec<Vector3<f64>>,
     /// Ground.
@@ -67,7 +71,8 @@ impl Surroundings {
         };
         let corners_m = [corner(low.add_scalar(-around_m), f64::floor), corner(high.add_scalar(around_m), f64::ceil)];
         let ground = Ground { corners_m, step_m, is_obstacle: hard_z.is_some() };
-        Self { box_m: [low, high], around_m, obstacles_m, ground }
+        let flown_m = (highest / 2.0 - lowest / 2.0).norm();
+        Self { box_m: [low, high], around_m, flown_m, obstacles_m, ground }
     }
 
     /// Returns the middle of the box \[m\].
@@ -76,6 +81,12 @@ impl Surroundings {
         // Halved first: the sum of the largest doubles overflows.
         let [low, high] = self.box_m;
         low / 2.0 + high / 2.0
+    }
+
+    /// Returns whether a swarm of this size, half a diagonal \[m\], travels so far that a camera follows it.
+    #[must_use]
+    pub fn is_far_for(&self, swarm_m: f64) -> bool {
+        swarm_m < TRAVELLING * self.flown_m
     }
 
     /// Returns half the sides of the box with the radius around vehicles \[m\].

@@ -81,8 +81,9 @@ struct Data<'a> {
     half_m: [f64; 3],
     /// Half of the box around all vehicles at any instant and their mean \[m\].
     swarm_m: [f64; 3],
-    /// First view, and whether it shows vehicles as lights.
+    /// First view, whether it follows the swarm, and whether it shows vehicles as lights.
     viewpoint: Viewpoint,
+    follows: bool,
     lights: bool,
     /// Clearance with the last colour \[m\].
     clearance_m: f64,
@@ -187,6 +188,7 @@ impl Replay {
         let [near_s, near_who] = statements::pairs(&near, log, place);
         let around = stage.surroundings(log, &shown);
         let origin_m = place_of_weightiest(log, listed).unwrap_or(around.middle_m());
+        let swarm_m = swarm_m(log, &shown).add_scalar(around.around_m);
         let most_said = MOST_SAID.map(|most| (room_bytes / 10 / SAID_BYTES).clamp(8, most));
         let has_gaps =
             !judged.is_else_known || moments.iter().any(|of| matches!(of.kind, Kind::Undecided | Kind::Unseen));
@@ -201,7 +203,8 @@ impl Replay {
             holds: log.holds,
             origin_m: origin_m.into(),
             half_m: around.half_m().into(),
-            swarm_m: swarm_m(log, &shown).add_scalar(around.around_m).into(),
+            swarm_m: swarm_m.into(),
+            follows: around.is_far_for(swarm_m.norm()),
             viewpoint: stage.viewpoint(log),
             lights: plan.as_ref().is_some_and(Plan::is_show),
             clearance_m: max_clearance_m(stage.delta_m(), shown.iter().map(|&k| stage.drawn_radius_m(k))),
