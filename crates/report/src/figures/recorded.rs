@@ -230,7 +230,7 @@ mod tests {
             closest_approach(&seen, "Closest approach")
         };
         let frames = |figure: &Figure| figure.svg.matches("<svg x=").count();
-        for (aside_m, insets) in [(1e-15, 0), (0.0, 0), (1.1e-3, 1), (0.5, 1)] {
+        for (aside_m, insets) in [(1e-15, 0), (0.0, 0), (1.1e-3, 1), (0.05, 1)] {
             let figure = above(aside_m);
             assert_eq!(frames(&figure), insets, "{aside_m}: {}", figure.svg);
             assert!(figure.file(Format::Png).starts_with(b"\x89PNG"));
