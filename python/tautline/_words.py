@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 Motion = Literal["linear", "hold", "polynomial", "bounded"]
+PlanEnd = Literal["hold", "continue", "unknown"]
 Rules = Literal["recording", "skybrush", "none"]
 Verdict = Literal["pass", "clear", "reached"]
 Duplicates = Literal["first", "last", "refuse"]

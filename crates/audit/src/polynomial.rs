@@ -11,6 +11,11 @@ pub(super) fn value(c: &[Vector3<f64>], u: f64) -> Vector3<f64> {
     c.iter().rev().fold(Vector3::zeros(), |sum, c| sum * u + c)
 }
 
+/// Returns the derivative at `u`, by Horner's rule.
+pub(super) fn derivative(c: &[Vector3<f64>], u: f64) -> Vector3<f64> {
+    (1..c.len()).rev().fold(Vector3::zeros(), |sum, k| sum * u + c[k] * k as f64)
+}
+
 /// Turns a polynomial in t into one in (t - start) / length, by Horner's shift of the origin.
 pub(super) fn rescale(c: &mut [Vector3<f64>], start: f64, length: f64) {
     let degree = c.len().saturating_sub(1);

@@ -124,6 +124,10 @@ coded! {
         PlanHeights = "plan-heights",
         /// Flight and plan are compared in the plane of x and y.
         PlanPlane = "plan-plane",
+        /// Motion of a vehicle after the end of its published plan.
+        PlanEnd = "plan-end",
+        /// Instants at which plans are published.
+        PlanPublication = "plan-publication",
         /// Accelerations are means over windows.
         MeanAcceleration = "mean-acceleration",
         /// Accelerations are those of the parabolas through three samples in a row.
@@ -263,7 +267,7 @@ impl Fact {
         match self.kind {
             FactKind::Motion => self.is_named(STRAIGHT) || self.is_named(HELD),
             // A recording with latitudes and longitudes may have heights in feet.
-            FactKind::HeightUnit => self.source == Source::Default,
+            FactKind::HeightUnit | FactKind::PlanEnd | FactKind::PlanPublication => self.source == Source::Default,
             FactKind::CommonStart
             | FactKind::GpsClocks
             | FactKind::LogTimes
@@ -322,6 +326,12 @@ impl fmt::Display for Fact {
             FactKind::PlanMotion => write!(out, "{subject} is straight between samples"),
             FactKind::PlanHeights => out.write_str("the heights of flight and plan have one reference"),
             FactKind::PlanPlane => out.write_str("flight and plan have equal heights, which are not compared"),
+            FactKind::PlanEnd => write!(out, "after the end of its plan {}", match value.as_str() {
+                "hold" => "each vehicle holds the last point",
+                "continue" => "each vehicle flies on with its last velocity",
+                _ => "the motion of each vehicle is unknown",
+            }),
+            FactKind::PlanPublication => write!(out, "plans are published at {value}"),
             FactKind::MeanAcceleration => write!(out, "accelerations are means over {value}"),
             FactKind::SampledAcceleration => {
                 out.write_str("accelerations are those of the parabolas through three samples in a row")

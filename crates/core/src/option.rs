@@ -179,6 +179,7 @@ options! {
     OUTPUT = "out" "output" Number;
     PLAN = "plan" "plan" Number;
     PLAN_DELAY = "plan-delay" "plan_delay" Number;
+    PLAN_END = "plan-end" "plan_end" Word;
     POSITION_ERROR = "position-error" "position_error" Number;
     PROOF = "proof" "proof" Number;
     PYTHON_LAW = "python-law" "law" Word;

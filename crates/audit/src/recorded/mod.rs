@@ -43,6 +43,7 @@ mod auditor;
 mod failure;
 mod outcome;
 mod plan;
+mod plans;
 mod second_pass;
 mod settings;
 mod smallest;
@@ -54,6 +55,7 @@ pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use outcome::{Absence, Contradiction, ExemptTime, Gap, Outcome, Presence, Tallies};
 pub use plan::{Deviation as PlanDeviation, PlanComparison, PlanFindings, Unknown as PlanUnknown};
+pub use plans::{PlanApproach, PlanAuditor, PlanConflict, PlanReference, PlansOutcome};
 pub use second_pass::{PairSample, PairSeries, PositionLookup};
 pub use settings::{
     Interpolation, RecordedError, Settings, TOUCHING_CYLINDER, TOUCHING_ELLIPSOIDS, TimedSetting, VehicleSettings,

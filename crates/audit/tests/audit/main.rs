@@ -11,6 +11,7 @@ mod flown;
 mod fractions;
 mod many_findings;
 mod plan;
+mod plans;
 mod presence;
 mod recorded;
 mod recorded_curves;

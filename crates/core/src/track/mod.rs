@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::str::FromStr;
 
 use nalgebra::Vector3;
 
@@ -36,6 +37,51 @@ pub struct Piece {
     pub to_s: f64,
     /// Coefficients \[m/s^k\] from degree 0 on; at least one.
     pub coefficients: Vec<Vector3<f64>>,
+}
+
+/// Curve that a planner published for a vehicle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Index into [`Tracks::vehicles`].
+    pub vehicle: usize,
+    /// Instant of publication, since the recording's epoch \[s\].
+    pub published_s: f64,
+    /// Pieces in order of time, at least one. The plan replaces earlier plans of the vehicle from its start on.
+    pub pieces: Vec<Piece>,
+}
+
+/// Motion of a vehicle after the end of its published plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlanEnd {
+    /// The vehicle holds the last point.
+    Hold,
+    /// The vehicle flies on with its last velocity.
+    Continue,
+    /// The motion is unknown and is not judged.
+    Unknown,
+}
+
+impl PlanEnd {
+    /// Returns the name of the choice.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Continue => "continue",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// Reads the name of the choice.
+impl FromStr for PlanEnd {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let all = [Self::Hold, Self::Continue, Self::Unknown];
+        let known = all.into_iter().find(|end| end.name() == name);
+        known.ok_or_else(|| format!("unknown end `{name}`; give hold, continue or unknown"))
+    }
 }
 
 /// Origin of local east, north and up coordinates.
@@ -181,6 +227,12 @@ pub trait Tracks {
 
     /// Properties of the recording as a whole. Notes may grow as the recording is read.
     fn metadata(&self) -> &Metadata;
+
+    /// Returns the plans of a recording of planners, in order of publication. The items of such a recording are the
+    /// parts of the plans that the vehicles fly: each until the next one of its vehicle starts.
+    fn plans(&self) -> &[Plan] {
+        &[]
+    }
 
     /// [`Metadata::clock`].
     fn clock(&self) -> &Clock {

@@ -10,7 +10,7 @@ use super::options::ReadOptions;
 use super::order::{BATCH, Recording};
 use super::source::{Source, VehicleFiles};
 use tautline_core::option::START;
-use tautline_core::track::{Item, Metadata, Piece, Sample, Tracks};
+use tautline_core::track::{Item, Metadata, Piece, Plan, Sample, Tracks};
 
 /// Smallest jump between two pieces of a curve that is reported \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
@@ -27,6 +27,8 @@ pub(super) type VehicleItems = Vec<(String, Vec<Item>)>;
 pub(super) struct Curves {
     vehicles: Vec<String>,
     items: std::vec::IntoIter<Item>,
+    /// Published plans, in order of publication.
+    plans: Vec<Plan>,
     metadata: Metadata,
 }
 
@@ -37,14 +39,19 @@ impl Curves {
     }
 
     /// Returns the recording of these vehicles, each with its items in order of time, and adds a note on jumps.
-    pub(super) fn with_metadata(mut vehicles: VehicleItems, mut metadata: Metadata) -> Recording {
+    pub(super) fn with_metadata(vehicles: VehicleItems, metadata: Metadata) -> Recording {
+        Self::with_plans(vehicles, metadata, Vec::new())
+    }
+
+    /// Returns the recording of these vehicles and of their published plans.
+    pub(super) fn with_plans(mut vehicles: VehicleItems, mut metadata: Metadata, plans: Vec<Plan>) -> Recording {
         align_ends(&mut vehicles);
         metadata.notes.extend(largest_jump(&vehicles));
         let (vehicles, items): (Vec<_>, Vec<_>) = vehicles.into_iter().unzip();
         let mut items: Vec<_> = items.into_iter().flatten().collect();
         // The sort is stable: items with the same time stay in the order of the vehicles.
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-        Box::new(Self { vehicles, items: items.into_iter(), metadata })
+        Box::new(Self { vehicles, items: items.into_iter(), plans, metadata })
     }
 }
 
@@ -63,6 +70,10 @@ impl Tracks for Curves {
 
     fn metadata(&self) -> &Metadata {
         &self.metadata
+    }
+
+    fn plans(&self) -> &[Plan] {
+        &self.plans
     }
 }
 

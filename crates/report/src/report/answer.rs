@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer};
 
 use tautline_audit::envelope::{Exceedance, Limit};
-use tautline_audit::recorded::WellClearLoss;
+use tautline_audit::recorded::{PlanApproach, PlanConflict, PlanReference, WellClearLoss};
 use tautline_audit::{Approach, LISTED, ObjectPair, Status, Tally, Undecided, Violation, WellClear};
 use tautline_core::fact::Fact;
+use tautline_core::swarm::Pair;
 
 /// Judgement of a flight or of a recording: the first keys of both reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -81,6 +82,8 @@ pub enum Part {
     Presence,
     /// Distance from a plan.
     Plan,
+    /// Separations of published plans: of each plan from those that were valid at its publication.
+    PublishedPlans,
 }
 
 impl Part {
@@ -93,6 +96,7 @@ impl Part {
             Self::WellClear(_) => "well_clear",
             Self::Presence => "presence",
             Self::Plan => "plan",
+            Self::PublishedPlans => "published_plans",
         }
     }
 }
@@ -197,6 +201,25 @@ pub struct Finding {
     /// Smallest vertical distance of a loss of well clear \[m\], whose value is the horizontal one; absent for others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vertical_m: Option<f64>,
+    /// Published plans of the two vehicles, the later published one first; absent for others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plans: Option<[PublishedPlan; 2]>,
+}
+
+/// Plan that a vehicle published.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct PublishedPlan {
+    /// Number among the plans of its vehicle, from 1.
+    pub number: u64,
+    /// Instant of publication \[s\].
+    pub published_s: f64,
+}
+
+impl From<PlanReference> for PublishedPlan {
+    fn from(PlanReference { number, published_s, .. }: PlanReference) -> Self {
+        Self { number, published_s }
+    }
 }
 
 /// Indices of the subjects of a finding, from 0.
@@ -210,8 +233,9 @@ pub enum Objects {
 
 impl Finding {
     fn new(objects: Objects, subjects: impl Into<Vec<String>>, value: Enclosure, limit: Option<f64>) -> Self {
-        let (subjects, from_s, to_s, at_s, rate_hz, vertical_m) = (subjects.into(), None, None, None, None, None);
-        Self { objects, subjects, from_s, to_s, at_s, value, limit, rate_hz, vertical_m }
+        let (subjects, plans) = (subjects.into(), None);
+        let (from_s, to_s, at_s, rate_hz, vertical_m) = (None, None, None, None, None);
+        Self { objects, subjects, from_s, to_s, at_s, value, limit, rate_hz, vertical_m, plans }
     }
 
     /// Sets start and end.
@@ -268,6 +292,21 @@ impl Finding {
         let objects = Objects::Pair(ObjectPair::Vehicles(found.pair));
         let finding = Self::new(objects, names, value, Some(limits.horizontal_m)).over(found.from_s, found.to_s);
         Self { vertical_m: Some(found.vertical_m), ..finding }
+    }
+
+    /// Returns the closest approach of two published plans; `names` are those of their vehicles.
+    pub(super) fn plan_approach(found: &PlanApproach, names: [String; 2], unit: &'static str) -> Self {
+        let plans = Some([found.plan, found.other].map(PublishedPlan::from));
+        Self { plans, ..Self::approach(&found.approach, names, unit) }
+    }
+
+    /// Returns a time in which two published plans are, or may be, closer than their limit.
+    pub(super) fn plan_conflict(found: &PlanConflict, names: [String; 2], unit: &'static str) -> Self {
+        let objects = Objects::Pair(ObjectPair::Vehicles(Pair::new(found.plan.vehicle, found.other.vehicle)));
+        let value = Enclosure::new(found.lower_m, found.upper_m, unit);
+        let plans = Some([found.plan, found.other].map(PublishedPlan::from));
+        let finding = Self::new(objects, names, value, Some(found.limit_m)).over(found.from_s, found.to_s);
+        Self { at_s: found.min_at_s, plans, ..finding }
     }
 
     /// Returns the distance of a vehicle from its plan.

@@ -1,6 +1,6 @@
 //! Answers and their findings in words, and as moments of a replay.
 
-use super::answer::{Answer, Finding, FindingList, Objects, Part};
+use super::answer::{Answer, Finding, FindingList, Objects, Part, PublishedPlan};
 use super::section::Section;
 use crate::replay::{Kind, LONGEST_NAME, Moment, Span, cut};
 use tautline_audit::envelope::{Limit, Quantity};
@@ -15,6 +15,7 @@ impl Answer {
         match self.part {
             Part::Limit(limit) => self.brief_on_limit(limit, status),
             Part::WellClear(limits) => self.brief_on_well_clear(limits, status),
+            Part::PublishedPlans => self.brief_on_published_plans(status),
             Part::Separation | Part::Presence | Part::Plan => String::new(),
         }
     }
@@ -76,6 +77,39 @@ impl Answer {
             Status::Undecided => match self.undecided.listed.first() {
                 Some(finding) => format!("{} ({thresholds})", finding.loss("may not be")),
                 None => format!("well clear is unknown at times ({thresholds})"),
+            },
+        }
+    }
+
+    fn brief_on_published_plans(&self, status: Status) -> String {
+        match status {
+            Status::Clear => {
+                let closest = self.closest.first().map_or(String::new(), |finding| {
+                    let limit = finding.limit.unwrap_or_default();
+                    let least = beside_limit(finding.value.lower_bound(), limit, 6);
+                    let time = finding.at_s.map_or(String::new(), |at_s| format!(" at {}", seconds(at_s)));
+                    format!(" closer than {least} {}, {}{time}", finding.value.unit, finding.names())
+                });
+                format!("published plans never come{closest}")
+            }
+            Status::Violation => {
+                let deepest = self
+                    .violations
+                    .listed
+                    .iter()
+                    .min_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
+                let others = match self.violations.count {
+                    ..=1 => String::new(),
+                    count => format!("; {count} violations of plans in all"),
+                };
+                deepest.map_or(String::new(), |finding| {
+                    let time = finding.at_s.map_or(String::new(), |at_s| format!(" at {}", seconds(at_s)));
+                    format!("{} come to {}{time}{others}", finding.names(), finding.too_close())
+                })
+            }
+            Status::Undecided => match self.undecided.listed.first() {
+                Some(finding) => finding.sentence(self.part, false),
+                None => "no two published plans are known at the same time".to_owned(),
             },
         }
     }
@@ -146,9 +180,9 @@ impl Answer {
 }
 
 /// Returns the closest approach, the violations and the undecided times, the gravest first. Distances and times are
-/// those of the audit. Findings against a plan are left out.
+/// those of the audit. Findings against a plan and between plans are left out, because a replay shows the flight.
 pub(super) fn moments(answers: &[Answer]) -> impl Iterator<Item = Moment> + '_ {
-    let answers = answers.iter().filter(|answer| answer.part != Part::Plan);
+    let answers = answers.iter().filter(|answer| !matches!(answer.part, Part::Plan | Part::PublishedPlans));
     let violations = answers.clone().flat_map(Answer::violation_moments);
     let undecided = answers.clone().flat_map(Answer::undecided_moments);
     answers.filter_map(Answer::closest_moment).chain(violations).chain(undecided)
@@ -156,7 +190,11 @@ pub(super) fn moments(answers: &[Answer]) -> impl Iterator<Item = Moment> + '_ {
 
 /// Returns the closest approaches of vehicles, or of vehicles and obstacles, as a table.
 pub(super) fn closest_table(answer: &Answer, are_of_obstacles: bool) -> Section {
-    let heading = if are_of_obstacles { "Closest to obstacles" } else { "Closest pairs" };
+    let heading = match answer.part {
+        Part::PublishedPlans => "Closest published plans",
+        _ if are_of_obstacles => "Closest to obstacles",
+        _ => "Closest pairs",
+    };
     let closest = || answer.closest.iter().filter(|finding| finding.is_of_obstacle() == are_of_obstacles);
     let unit = closest().next().map_or("", |finding| finding.value.unit);
     let row = |finding: &Finding| {
@@ -202,9 +240,13 @@ pub(super) fn shortened_in_words(tally: Tally) -> String {
 }
 
 impl Finding {
-    /// Returns the names of all subjects.
+    /// Returns the names of all subjects, and their plans.
     pub(super) fn names(&self) -> String {
-        self.subjects.join(" and ")
+        let Some(plans) = &self.plans else { return self.subjects.join(" and ") };
+        let named = self.subjects.iter().zip(plans).map(|(vehicle, PublishedPlan { number, published_s })| {
+            format!("plan {number} of {vehicle} (published at {})", seconds(*published_s))
+        });
+        named.collect::<Vec<_>>().join(" and ")
     }
 
     /// Returns the finding with names cut to the length that a replay shows.

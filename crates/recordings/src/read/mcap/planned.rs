@@ -1,7 +1,8 @@
 //! Reads curves of planners: `traj_utils/msg/Bspline` of EGO-Planner, and `traj_utils/msg/MINCOTraj` and
 //! `traj_utils/msg/PolyTraj` of its version 2.
 //!
-//! A curve of a drone is flown from its start until the next one of that drone starts. The trajectory server of the
+//! A curve of a drone is flown from its start until the next one of that drone starts. The whole curve is a published
+//! plan ([`Published`]). The trajectory server of the
 //! first version holds the last point of a curve. That of the second version sends nothing after the end: the motion is
 //! unknown there.
 //!
@@ -27,12 +28,14 @@ use crate::mcap::topic::{CDR, Part as FilePart, decode};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::{CLOCK, DUPLICATES, FRAME, ORIGIN, SORT, TOPIC};
 use tautline_core::text::counted;
-use tautline_core::track::{Clock, Item, Metadata};
+use tautline_core::track::{Clock, Item, Metadata, Plan as Published, PlanEnd};
 
 /// Degree of the curves of EGO-Planner v2.
 const DEGREE: u8 = 5;
 
 const NS_PER_S: i64 = 1_000_000_000;
+/// Largest time between the publication of a curve and its start, by which log times and starts have one clock \[ns\].
+const ONE_CLOCK_NS: i64 = 60 * NS_PER_S;
 
 /// Returns the remedy for a curve that contradicts itself.
 fn replan() -> String {
@@ -64,7 +67,7 @@ pub(super) fn open(
         return refuse(ContentKind::UnusedOption, why, format!("omit {option}"));
     }
     let (mut drones, mut number) = (BTreeMap::<i32, BTreeMap<i64, Plan>>::new(), 0);
-    let mut repeated = 0;
+    let (mut repeated, mut published) = (0, Vec::new());
     splits.visit_all(|part| {
         let FilePart::Message(message) = part else { return Ok(()) };
         if !outline.curves.contains(&message.of.topic) || !is_curve(&message.of.schema) {
@@ -80,7 +83,10 @@ pub(super) fn open(
         let (drone, plan) = read(&message.of.encoding, message.bytes).map_err(|fault| fault.at(place()))?;
         let start_ns = plan.start_ns;
         match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
-            None => Ok(()),
+            None => {
+                published.push((i64::try_from(message.log_ns).unwrap_or(i64::MAX), drone, start_ns));
+                Ok(())
+            }
             Some(known) if known == plan => {
                 repeated += 1;
                 Ok(())
@@ -108,11 +114,51 @@ pub(super) fn open(
     }
     let vehicles = vehicles(&drones, epoch_ns, options.metres(), &mut notes)?;
     let clock = Clock { unit: "ns", epoch_ns, ..Clock::default() };
-    let facts = vec![
+    let mut facts = vec![
         Fact::name(FactKind::Clock, fact::Source::Recorded, "times of start in messages"),
         Fact::name(FactKind::Identity, fact::Source::Deduced, "numbers of drones in messages"),
     ];
-    Ok(Some(Curves::with_metadata(vehicles, Metadata { clock, facts, ..Metadata::in_seconds(notes) })))
+    // Recorders write log times by their own clock, planners in simulations start by the simulated one.
+    let is_one_clock = published.iter().all(|(log_ns, _, start_ns)| log_ns.abs_diff(*start_ns) <= ONE_CLOCK_NS as u64);
+    facts.push(if is_one_clock {
+        Fact::name(FactKind::PlanPublication, fact::Source::Recorded, "their log times")
+    } else {
+        for (log_ns, _, start_ns) in &mut published {
+            *log_ns = *start_ns;
+        }
+        Fact::name(FactKind::PlanPublication, fact::Source::Default, "their starts")
+    });
+    if drones.values().flat_map(BTreeMap::values).all(|plan| plan.is_held) {
+        facts.push(Fact::name(FactKind::PlanEnd, fact::Source::Convention, PlanEnd::Hold.name()));
+    }
+    let plans = published_plans(&drones, published, epoch_ns, options.metres())?;
+    Ok(Some(Curves::with_plans(vehicles, Metadata { clock, facts, ..Metadata::in_seconds(notes) }, plans)))
+}
+
+/// Returns the whole curves in order of publication, given as instants of publication, drones and starts \[ns\].
+fn published_plans(
+    drones: &BTreeMap<i32, BTreeMap<i64, Plan>>,
+    mut published: Vec<(i64, i32, i64)>,
+    epoch_ns: i64,
+    scale: f64,
+) -> Result<Vec<Published>, Fault> {
+    published.sort_unstable();
+    let indices: BTreeMap<i32, usize> = drones.keys().enumerate().map(|(vehicle, drone)| (*drone, vehicle)).collect();
+    let plan = |(published_ns, drone, start_ns): (i64, i32, i64)| {
+        let (vehicle, start_s) = (indices[&drone], seconds_since(epoch_ns, start_ns));
+        let pieces = drones[&drone][&start_ns].parts.iter().map(|(from_s, to_s, coefficients)| {
+            let (from_s, to_s) = (start_s + from_s, start_s + to_s);
+            piece(vehicle, from_s, to_s, coefficients.iter().copied(), scale).ok_or_else(Fault::out_of_range)
+        });
+        let published_s = seconds_since(epoch_ns, published_ns);
+        Ok(Published { vehicle, published_s, pieces: pieces.collect::<Result<_, Fault>>()? })
+    };
+    published.into_iter().map(plan).collect()
+}
+
+/// Returns the time since the epoch \[s\]. Both times are close, so that the difference in nanoseconds is exact.
+fn seconds_since(epoch_ns: i64, time_ns: i64) -> f64 {
+    time_ns.saturating_sub(epoch_ns) as f64 / NS_PER_S as f64
 }
 
 /// Returns the names and the pieces of all drones, and adds notes on the ends of curves.
@@ -122,8 +168,7 @@ fn vehicles(
     scale: f64,
     notes: &mut Vec<String>,
 ) -> Result<VehicleItems, Fault> {
-    // Both times are close, so that the difference in nanoseconds is exact.
-    let seconds = |ns: i64| ns.saturating_sub(epoch_ns) as f64 / NS_PER_S as f64;
+    let seconds = |ns: i64| seconds_since(epoch_ns, ns);
     let ends_s = drones.values().flatten().map(|(start_ns, plan)| seconds(*start_ns) + plan.duration_s());
     let end_s = ends_s.fold(f64::NEG_INFINITY, f64::max);
     let (mut held, mut unknown) = (0, 0);

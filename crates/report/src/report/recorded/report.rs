@@ -8,7 +8,7 @@ use crate::report::flight::{SCHEMA_VERSION, finite};
 use tautline_audit::envelope::{self, Corner, Exceedance, LimitOutcome};
 use tautline_audit::recorded::{
     Absence, Contradiction, ExemptTime, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_CYLINDER,
-    TOUCHING_ELLIPSOIDS, WellClearLoss, WellClearOutcome,
+    PlanConflict, PlanReference, PlansOutcome, TOUCHING_ELLIPSOIDS, WellClearLoss, WellClearOutcome,
 };
 use tautline_audit::{Status, Tally};
 use tautline_core::fact::{BOUNDED, Fact, FactKind, RUN_AUDIT, Source as FactSource};
@@ -300,6 +300,27 @@ impl RecordedReport {
         self.question.plan = Some(plan.file.clone());
         self.source.facts.extend(facts);
         self.plan = Some(plan);
+        self
+    }
+
+    /// Returns the report with the findings between published plans. Its status is the worse of the two.
+    #[must_use]
+    pub fn with_published_plans(mut self, found: &PlansOutcome) -> Self {
+        let unit = self.unit();
+        let name = |plan: PlanReference| self.vehicles.get(plan.vehicle).cloned().unwrap_or_default();
+        let conflict =
+            |found: &PlanConflict| Finding::plan_conflict(found, [found.plan, found.other].map(name), unit);
+        let closest = found.closest.iter();
+        let closest =
+            closest.map(|found| Finding::plan_approach(found, [found.plan, found.other].map(name), unit)).collect();
+        let answer = Answer {
+            closest,
+            violations: FindingList::new(found.violations_tally, found.violations.iter().map(conflict).collect()),
+            undecided: FindingList::new(found.undecided_tally, found.undecided.iter().map(conflict).collect()),
+            ..Answer::new(Part::PublishedPlans, found.status)
+        };
+        self.status = self.status.and(found.status);
+        self.answers.push(answer);
         self
     }
 

@@ -310,6 +310,8 @@ impl RecordedReport {
         let answers = || self.answers.iter().filter(|answer| answer.part != Part::Plan);
         let [violations, undecided] = lists(answers);
         let closest = |is_of_obstacle| self.separation().map(|answer| closest_table(answer, is_of_obstacle));
+        let of_published = self.answers.iter().filter(|answer| answer.part == Part::PublishedPlans);
+        let of_published = of_published.map(|answer| closest_table(answer, false));
         let sections = [
             Section::table("Each vehicle by itself", "limits, and the vehicles closest to them", columns, limits),
             Section::list(
@@ -328,7 +330,7 @@ impl RecordedReport {
         ];
         let against_plan = self.plan.iter().flat_map(PlanReport::sections);
         let closest = [closest(false), closest(true)].into_iter().flatten();
-        closest.chain(sections).chain(against_plan).filter(|section| !section.rows.is_empty()).collect()
+        closest.chain(of_published).chain(sections).chain(against_plan).filter(|section| !section.rows.is_empty()).collect()
     }
 
     /// Returns the lists that are cut, a sentence each.
@@ -340,6 +342,9 @@ impl RecordedReport {
                     ["violations", "undecided times"].map(|what| format!("{what} of {}", limit.quantity.key()))
                 }
                 Part::WellClear(_) => ["losses of well clear", "undecided times of well clear"].map(str::to_owned),
+                Part::PublishedPlans => {
+                    ["violations of published plans", "undecided times of published plans"].map(str::to_owned)
+                }
                 _ => ["violations", "undecided times"].map(str::to_owned),
             };
             [(violations, sum([&answer.violations])), (undecided, sum([&answer.undecided]))]

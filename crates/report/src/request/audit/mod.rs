@@ -6,6 +6,7 @@ mod options;
 mod own;
 mod places;
 mod proof;
+mod published;
 mod question;
 mod replays;
 pub mod rules;
@@ -33,7 +34,7 @@ use crate::report::Status;
 use crate::report::recorded::{Clock, RecordedReport, Source};
 use replays::Instants;
 use side_files::{ItemSpan, SideFiles};
-use tautline_audit::recorded::{ObjectPair, Outcome, PairSample, PairSeries, Presence, Settings, TrackAuditor};
+use tautline_audit::recorded::{ObjectPair, Outcome, PairSample, PairSeries, PlansOutcome, Presence, Settings, TrackAuditor};
 use tautline_audit::{MovingObstacle, Violation, are_decimals_apart};
 use tautline_core::fact::{Fact, FactKind, Source as FactSource};
 use tautline_core::files::write_atomically;
@@ -205,13 +206,14 @@ impl ConfiguredAudit<'_> {
         if clock.inferred && facts.iter().all(|fact| fact.kind != FactKind::TimeUnit) {
             facts.push(Fact::name(FactKind::TimeUnit, FactSource::Inferred, &clock.unit));
         }
+        let plans = request.judge_plans(recording.as_ref(), &settings, &outcome, &mut facts, monitor)?;
         let notes = recording.notes().to_vec();
         request.check_count(&outcome, &settings)?;
         side_files.check(&settings, &outcome)?;
         side_files::check_offsets(&settings, &outcome, span.length_s())?;
         facts.extend(side_files.facts(&settings, &outcome));
         let source = Source { recording: called, clock, planar: is_planar, notes, facts };
-        Ok(JudgedRecording { settings, own, outcome, source, notes_on_question, curves, instants })
+        Ok(JudgedRecording { settings, own, outcome, plans, source, notes_on_question, curves, instants })
     }
 
     /// Answers the question: by the samples or by the run's own audit, against a plan, with an early end.
@@ -222,7 +224,7 @@ impl ConfiguredAudit<'_> {
     ) -> Result<(RecordedReport, Option<Figure>), Failure> {
         let request = &self.request;
         let open: &Open<'_> = &|| request.subject.open();
-        let JudgedRecording { settings, own, outcome, source, notes_on_question, curves, .. } = judged;
+        let JudgedRecording { settings, own, outcome, plans, source, notes_on_question, curves, .. } = judged;
         let (settings, own) = (&*settings, own.as_ref());
         let answer = own.map(|own| own.answer(outcome, settings, request, &mut source.notes));
         let is_by_run = answer == Some(RunAnswer::Repeated);
@@ -245,6 +247,7 @@ impl ConfiguredAudit<'_> {
         let tie = decimal_tie(open, settings, outcome, monitor)?;
         let compared = against_plan::compare(&request.options, &flight, monitor)?;
         let report = RecordedReport::new(outcome, settings, source.clone());
+        let report = plans.iter().fold(report, RecordedReport::with_published_plans);
         let (mut report, plan_figure) = against_plan::attach(report, compared, is_by_run, monitor);
         if let Some(RunAnswer::Undecided(why)) = answer {
             report.run_objection = Some(why);
@@ -467,6 +470,8 @@ struct JudgedRecording {
     settings: Settings,
     own: Option<OwnRecording>,
     outcome: Outcome,
+    /// Findings between published plans, if the recording has plans.
+    plans: Option<PlansOutcome>,
     source: Source,
     notes_on_question: Vec<String>,
     /// Whether the recording has curves instead of samples.

@@ -1,0 +1,211 @@
+//! Published plans: each against the plans that were valid at its publication.
+
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use tautline_audit::Status;
+use tautline_audit::recorded::{PlanAuditor, PlansOutcome, RecordedError, Settings};
+use tautline_core::track::{Piece, Plan, PlanEnd};
+
+/// Returns a plan of one piece along x, from `x_m` at 1 m/s.
+fn along_x(vehicle: usize, published_s: f64, from_s: f64, to_s: f64, x_m: f64, y_m: f64) -> Plan {
+    plan(vehicle, published_s, &[(from_s, to_s)], &[[x_m, y_m, 1.0], [1.0, 0.0, 0.0]])
+}
+
+/// Returns a plan whose pieces continue one polynomial of the time since its start.
+fn plan(vehicle: usize, published_s: f64, spans: &[(f64, f64)], coefficients: &[[f64; 3]]) -> Plan {
+    let start_s = spans[0].0;
+    let coefficients: Vec<_> = coefficients.iter().copied().map(Vector3::from).collect();
+    let pieces = spans.iter().map(|&(from_s, to_s)| {
+        // Horner's shift of the origin to the start of the piece.
+        let mut shifted = coefficients.clone();
+        for lowest in 0..shifted.len() - 1 {
+            for k in (lowest..shifted.len() - 1).rev() {
+                let higher = shifted[k + 1];
+                shifted[k] += higher * (from_s - start_s);
+            }
+        }
+        Piece { vehicle, from_s, to_s, coefficients: shifted }
+    });
+    Plan { vehicle, published_s, pieces: pieces.collect() }
+}
+
+fn judged(end: PlanEnd, plans: &[Plan]) -> PlansOutcome {
+    let vehicles = plans.iter().map(|plan| plan.vehicle + 1).max().unwrap_or(0);
+    let names: Vec<_> = (0..vehicles).map(|vehicle| vehicle.to_string()).collect();
+    let mut auditor = PlanAuditor::new(Settings::delta(0.5), end).expect("settings");
+    for plan in plans {
+        auditor.push(&names, plan).expect("a plan");
+    }
+    auditor.finish()
+}
+
+/// Returns the later and the earlier plan of each violation, as vehicle and number, and its closest instant.
+fn violations(outcome: &PlansOutcome) -> Vec<((usize, u64), (usize, u64), f64)> {
+    let reference = |plan: tautline_audit::recorded::PlanReference| (plan.vehicle, plan.number);
+    let found = outcome.violations.iter();
+    found.map(|found| (reference(found.plan), reference(found.other), found.min_at_s.expect("an instant"))).collect()
+}
+
+#[test]
+fn plans_that_cross_later_are_found_although_present_positions_are_far_apart() {
+    // Head-on, 10 m apart at publication: they meet after 5 s.
+    let towards = plan(1, 0.2, &[(0.0, 4.0), (4.0, 10.0)], &[[10.0, 0.1, 1.0], [-1.0, 0.0, 0.0]]);
+    let outcome = judged(PlanEnd::Hold, &[along_x(0, 0.0, 0.0, 10.0, 0.0, 0.0), towards]);
+    assert_eq!(outcome.status, Status::Violation);
+    assert_eq!(violations(&outcome), [((1, 1), (0, 1), 5.0)]);
+    let found = &outcome.violations[0];
+    assert_eq!((found.plan.published_s, found.limit_m), (0.2, 0.5));
+    assert!((found.upper_m - 0.1).abs() < 1e-9, "{found:?}");
+    // Negative twin: 1 m to the side.
+    let aside = plan(1, 0.2, &[(0.0, 4.0), (4.0, 10.0)], &[[10.0, 1.0, 1.0], [-1.0, 0.0, 0.0]]);
+    let outcome = judged(PlanEnd::Hold, &[along_x(0, 0.0, 0.0, 10.0, 0.0, 0.0), aside]);
+    assert_eq!((outcome.status, outcome.plans, outcome.comparisons), (Status::Clear, 2, 1));
+    let closest = outcome.closest[0].approach;
+    assert!((closest.lower_m - 1.0).abs() < 1e-9 && (closest.time_s - 5.0).abs() < 1e-3, "{closest:?}");
+}
+
+#[test]
+fn only_plans_that_are_valid_at_the_publication_count() {
+    let first = along_x(0, 0.0, 0.0, 10.0, 0.0, 0.0);
+    let towards = |published_s| plan(1, published_s, &[(0.0, 10.0)], &[[10.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]);
+    // From 2 s on the first vehicle turns aside.
+    let turn = plan(0, 2.0, &[(2.0, 10.0)], &[[2.0, 0.0, 1.0], [0.0, 1.0, 0.0]]);
+    // Published before the turn, the plan is in conflict; published after it, the plan is clear.
+    assert_eq!(violations(&judged(PlanEnd::Hold, &[first.clone(), towards(1.0), turn.clone()])), [(
+        (1, 1),
+        (0, 1),
+        5.0
+    )]);
+    assert_eq!(judged(PlanEnd::Hold, &[first.clone(), turn, towards(3.0)]).status, Status::Clear);
+    // A later start keeps the earlier plan until then.
+    let late = plan(0, 2.0, &[(6.0, 10.0)], &[[6.0, 0.0, 1.0], [0.0, 1.0, 0.0]]);
+    assert_eq!(violations(&judged(PlanEnd::Hold, &[first.clone(), late, towards(3.0)])), [((1, 1), (0, 1), 5.0)]);
+    // The past of a plan is not judged: the two have passed each other before the publication.
+    assert_eq!(judged(PlanEnd::Hold, &[first, towards(6.0)]).status, Status::Clear);
+}
+
+#[test]
+fn the_last_piece_counts() {
+    // Parallel for three quarters; the last quarter leads onto the other plan.
+    let straight = along_x(0, 0.0, 0.0, 4.0, 0.0, 0.0);
+    let mut swerve = along_x(1, 0.1, 0.0, 3.0, 0.0, 1.0);
+    let last = [[3.0, 1.0, 1.0], [1.0, -0.9, 0.0]].map(Vector3::from);
+    swerve.pieces.push(Piece { vehicle: 1, from_s: 3.0, to_s: 4.0, coefficients: last.to_vec() });
+    let outcome = judged(PlanEnd::Hold, &[straight.clone(), swerve.clone()]);
+    assert_eq!(violations(&outcome), [((1, 1), (0, 1), 4.0)]);
+    // Negative twin: without its last piece the plan ends 1 m aside.
+    swerve.pieces.pop();
+    assert_eq!(judged(PlanEnd::Unknown, &[straight, swerve]).status, Status::Clear);
+}
+
+#[test]
+fn the_motion_after_an_end_is_held_continued_or_unknown() {
+    // The first plan ends after 2 s at x = 2; the second passes that point after 8 s.
+    let ends = along_x(0, 0.0, 0.0, 2.0, 0.0, 0.0);
+    let passes = plan(1, 1.0, &[(1.0, 12.0)], &[[9.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]);
+    let both = [ends.clone(), passes.clone()];
+    assert_eq!(violations(&judged(PlanEnd::Hold, &both)), [((1, 1), (0, 1), 8.0)]);
+    // Continued they meet half-way: 1 + (t - 1) = 9 - (t - 1).
+    assert_eq!(violations(&judged(PlanEnd::Continue, &both)), [((1, 1), (0, 1), 5.0)]);
+    assert_eq!(judged(PlanEnd::Unknown, &both).status, Status::Clear);
+    // A plan that ended before the publication is held too: the vehicle still hovers there.
+    let late = Plan { published_s: 6.0, ..passes };
+    assert_eq!(violations(&judged(PlanEnd::Hold, &[ends.clone(), late.clone()])), [((1, 1), (0, 1), 8.0)]);
+    // With an unknown end there is nothing to compare.
+    let outcome = judged(PlanEnd::Unknown, &[ends, late]);
+    assert_eq!((outcome.status, outcome.comparisons), (Status::Undecided, 0));
+}
+
+#[test]
+fn invalid_plans_are_refused() {
+    let names = ["a".to_owned(), "b".to_owned()];
+    let auditor = || PlanAuditor::new(Settings::delta(0.5), PlanEnd::Hold).expect("settings");
+    let valid = along_x(0, 1.0, 1.0, 2.0, 0.0, 0.0);
+    let mut earlier = auditor();
+    earlier.push(&names, &valid).expect("a plan");
+    let error = earlier.push(&names, &along_x(1, 0.5, 1.0, 2.0, 9.0, 0.0)).expect_err("published before");
+    assert!(matches!(error, RecordedError::OutOfOrder { .. }), "{error}");
+    for wrong in [
+        Plan { published_s: f64::NAN, ..valid.clone() },
+        Plan { vehicle: 2, ..valid.clone() },
+        plan(0, 1.0, &[(1.0, 2.0)], &[[f64::NAN, 0.0, 0.0], [0.0; 3]]),
+        plan(0, 1.0, &[(2.0, 1.0)], &[[0.0; 3], [0.0; 3]]),
+        plan(0, 1.0, &[(1.0, 2.0), (1.5, 3.0)], &[[0.0; 3], [0.0; 3]]),
+    ] {
+        auditor().push(&names, &wrong).expect_err("refused");
+    }
+    assert!(PlanAuditor::new(Settings::delta(-1.0), PlanEnd::Hold).is_err());
+    let no_limit = PlanAuditor::new(Settings { radius_m: Some(0.0), ..Settings::default() }, PlanEnd::Hold);
+    no_limit.expect("settings").push(&names, &valid).expect_err("no limit");
+}
+
+/// Returns the position of a plan at an instant, held after its end.
+fn position(plan: &Plan, time_s: f64) -> Vector3<f64> {
+    let piece = plan.pieces.iter().rfind(|piece| piece.from_s <= time_s).expect("a piece");
+    let elapsed_s = time_s.min(piece.to_s) - piece.from_s;
+    piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, c| sum * elapsed_s + c)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Compares the verdict with plans of four vehicles sampled finely, by an own model of what is valid when.
+    #[test]
+    fn random_plans_agree_with_fine_samples(
+        drawn in prop::collection::vec(
+            (0..4_usize, 0.0..0.6_f64, 0.0..1.0_f64, 0.5..3.0_f64, prop::array::uniform6(-2.0..2.0_f64), -1.0..1.0_f64),
+            2..14,
+        ),
+    ) {
+        let mut now_s = 0.0;
+        let plans: Vec<_> = drawn.iter().map(|(vehicle, wait_s, late_s, lasts_s, c, bend)| {
+            now_s += wait_s;
+            let (from_s, middle_s) = (now_s + late_s, now_s + late_s + 0.4 * lasts_s);
+            let coefficients = [[c[0], c[1], c[2]], [c[3], c[4], c[5]], [*bend, -bend, 0.5 * bend]];
+            plan(*vehicle, now_s, &[(from_s, middle_s), (middle_s, from_s + lasts_s)], &coefficients)
+        }).collect();
+        let outcome = judged(PlanEnd::Hold, &plans);
+        let mut least = f64::INFINITY;
+        let mut below = Vec::new();
+        for (k, plan) in plans.iter().enumerate() {
+            for other in (0..4).filter(|other| *other != plan.vehicle) {
+                // Published plans, without those that a later one replaced from their start on.
+                let mut valid: Vec<&Plan> = Vec::new();
+                for earlier in plans[..k].iter().filter(|earlier| earlier.vehicle == other) {
+                    valid.retain(|valid| valid.pieces[0].from_s < earlier.pieces[0].from_s);
+                    valid.push(earlier);
+                }
+                let starts = valid.iter().skip(1).map(|next| next.pieces[0].from_s).chain([f64::INFINITY]);
+                let ends = valid.iter().zip(starts).map(|(plan, until_s)| plan.pieces[1].to_s.min(until_s));
+                let ends = ends.fold(plan.pieces[1].to_s, f64::max);
+                let from_s = plan.pieces[0].from_s.max(plan.published_s);
+                let steps = 600;
+                for step in 0..=steps {
+                    let time_s = from_s + (ends - from_s).max(0.0) * f64::from(step) / f64::from(steps);
+                    let Some(flown) = valid.iter().rfind(|valid| valid.pieces[0].from_s <= time_s) else { continue };
+                    let distance_m = (position(plan, time_s) - position(flown, time_s)).norm();
+                    least = least.min(distance_m);
+                    if distance_m < 0.5 {
+                        below.push((k, other, time_s));
+                    }
+                }
+            }
+        }
+        // Every sample below the limit is in a violation of its two vehicles.
+        let number = |k: usize| plans[..=k].iter().filter(|plan| plan.vehicle == plans[k].vehicle).count() as u64;
+        for (k, other, time_s) in &below {
+            let is_found = outcome.violations.iter().any(|found| {
+                found.plan.vehicle == plans[*k].vehicle && found.plan.number == number(*k) && found.other.vehicle == *other
+                    && found.from_s - 1e-9 <= *time_s && *time_s <= found.to_s + 1e-9
+            });
+            prop_assert!(is_found, "{k} {other} {time_s} {:?}", outcome.violations);
+        }
+        prop_assert!(!below.is_empty() || outcome.violations.iter().all(|found| found.upper_m > 0.5 - 0.05));
+        if let Some(closest) = outcome.closest.first() {
+            prop_assert!(closest.approach.lower_m <= least + 1e-9, "{closest:?} {least}");
+        }
+        if outcome.status == Status::Clear {
+            prop_assert!(least >= 0.5 - 1e-9, "{least}");
+        }
+    }
+}
