@@ -154,7 +154,7 @@ impl Contents {
         let taken = match topics.next()? {
             Some(Part::Topic(declared)) => self.declare(declared),
             Some(Part::Message(message)) => self.take(&message),
-            Some(Part::Schema(_) | Part::Other) => Ok(()),
+            Some(Part::Schema(..) | Part::Other) => Ok(()),
             None => return Ok(false),
         };
         taken.map(|()| true).map_err(|fault| topics.fault(fault))

@@ -130,6 +130,8 @@ pub(crate) struct DeclaredTopic {
     /// Name of the schema; empty without a schema.
     pub(crate) schema: String,
     pub(crate) encoding: String,
+    /// Definition of the messages; empty if the file has none, or if it is no text.
+    pub(crate) definition: String,
 }
 
 /// Message of a topic.
@@ -143,8 +145,8 @@ pub(crate) struct Message<'a> {
 
 /// Next part of a file.
 pub(crate) enum Part<'a> {
-    /// The name of a schema.
-    Schema(&'a str),
+    /// Name and definition of a schema.
+    Schema(&'a str, &'a str),
     Topic(&'a DeclaredTopic),
     Message(Message<'a>),
     /// Record without topic information, or a message of an undeclared topic.
@@ -155,7 +157,8 @@ pub(crate) enum Part<'a> {
 pub(crate) struct TopicReader {
     path: PathBuf,
     records: RecordReader,
-    schemas: BTreeMap<u16, String>,
+    /// Names and definitions of the schemas.
+    schemas: BTreeMap<u16, (String, String)>,
     topics: BTreeMap<u16, DeclaredTopic>,
 }
 
@@ -183,8 +186,9 @@ impl TopicReader {
         let mut fields = Fields(body);
         let part = match opcode {
             op::SCHEMA => fields.u16().zip(fields.str()).map(|(number, name)| {
-                self.schemas.insert(number, name.to_owned());
-                Part::Schema(name)
+                let definition = fields.str().and_then(|_| fields.str()).unwrap_or_default();
+                self.schemas.insert(number, (name.to_owned(), definition.to_owned()));
+                Part::Schema(name, definition)
             }),
             op::CHANNEL => declared(fields, &self.schemas).map(|declared| {
                 let channel = declared.channel;
@@ -201,10 +205,11 @@ impl TopicReader {
     }
 }
 
-fn declared(mut fields: Fields<'_>, schemas: &BTreeMap<u16, String>) -> Option<DeclaredTopic> {
+fn declared(mut fields: Fields<'_>, schemas: &BTreeMap<u16, (String, String)>) -> Option<DeclaredTopic> {
     let (channel, schema) = (fields.u16()?, fields.u16()?);
     let (topic, encoding) = (fields.str()?.to_owned(), fields.str()?.to_owned());
-    Some(DeclaredTopic { channel, topic, schema: schemas.get(&schema).cloned().unwrap_or_default(), encoding })
+    let (schema, definition) = schemas.get(&schema).cloned().unwrap_or_default();
+    Some(DeclaredTopic { channel, topic, schema, encoding, definition })
 }
 
 /// Returns channel, log time \[ns\] and content of a message.

@@ -353,3 +353,77 @@ fn wrong_bezier_tables_name_line_and_value() {
     let error = read_bytes("cf1.csv", b"t,x,y,z\n0,1,2,3\n", &forced).expect_err("no header");
     assert_refused(&error, "recording/no-header", "line 1");
 }
+
+/// Returns the instant of publication, the vehicle, and start and end of each plan, and the clauses of assumptions.
+fn plans(bytes: &[u8]) -> (Vec<(f64, String, f64, f64)>, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plan.mcap");
+    fs::write(&path, bytes).expect("written");
+    let tracks = read::open(&path, &ReadOptions::default()).expect("read");
+    let ends = |pieces: &[Piece]| (pieces[0].from_s, pieces[pieces.len() - 1].to_s);
+    let all = tracks.plans().iter().map(|plan| {
+        let (from_s, to_s) = ends(&plan.pieces);
+        (plan.published_s, tracks.vehicles()[plan.vehicle].clone(), from_s, to_s)
+    });
+    let assumed = tracks.facts().iter().filter(|fact| fact.is_assumption()).map(ToString::to_string);
+    (all.collect(), assumed.collect())
+}
+
+#[test]
+fn plans_are_published_at_their_log_times_or_at_their_starts() {
+    let second_ns = 1_000_000_000;
+    let start_ns = u64::try_from(SEC).expect("after 1970") * second_ns;
+    let at = |message: &Bspline, log_ns| (TOPIC, B_SPLINE, "cdr", log_ns, cdr(message, true));
+    let mut replanned = spline(4, 250_000_000, 1.0);
+    replanned.3.0 += 2;
+    // The whole first curve is a plan, although it is flown until 2.25 s only.
+    let logged = [at(&replanned, start_ns + 2 * second_ns), at(&spline(4, 250_000_000, 0.0), start_ns + second_ns / 2)];
+    let (found, assumed) = plans(&mcap_of(&logged));
+    assert_eq!(found, [(0.5, "4".to_owned(), 0.25, 4.25), (2.0, "4".to_owned(), 2.25, 6.25)]);
+    assert_eq!(assumed, Vec::<String>::new(), "log times are recorded, and EGO-Planner holds the last point");
+    // The log times of a recorder are those of another clock than the simulated one.
+    let (found, assumed) = plans(&mcap_of(&[at(&replanned, 7), at(&spline(4, 250_000_000, 0.0), 9)]));
+    assert_eq!(found, [(0.25, "4".to_owned(), 0.25, 4.25), (2.25, "4".to_owned(), 2.25, 6.25)]);
+    assert_eq!(assumed, ["plans are published at their starts"]);
+}
+
+#[test]
+fn a_list_of_b_splines_has_a_curve_of_each_drone() {
+    let empty: Bspline = (0, 0, 0, (0, 0), vec![], vec![], vec![], 0.0);
+    let list = (2, vec![spline(1, 0, 0.0), empty, spline(2, 0, 3.0)]);
+    let message = ("/swarm_trajs", "traj_utils/msg/MultiBsplines", "cdr", 7, cdr(&list, true));
+    let found = whole("plan.mcap", &mcap_of(&[message]));
+    assert_eq!(found.vehicles, ["1", "2"]);
+    assert_near(position(&found, "2", 1.0), [2.0, 3.0, 1.0]);
+    let has = |words: &str| found.notes.iter().any(|note| note.contains(words));
+    assert!(has("the names of schemas decide"), "{:?}", found.notes);
+    // Negative twin: an element with knots and without points is damaged.
+    let damaged = (2, vec![(0, 3, 0, (0, 0), vec![0.0], vec![], vec![], 0.0), spline(2, 0, 3.0)]);
+    let damaged: (i32, Vec<Bspline>) = damaged;
+    let message = ("/swarm_trajs", "traj_utils/msg/MultiBsplines", "cdr", 7, cdr(&damaged, true));
+    assert_refused(&refused(&[message], &ReadOptions::default()), "recording/knots", "curve 1 on topic `/swarm_trajs`");
+}
+
+#[test]
+fn the_definition_in_a_bag_decides_how_a_message_is_read() {
+    let fields = "int16 drone_id\nint32 traj_id\ntime start_time\nuint8 order\nfloat32[] coef_x\nfloat32[] coef_y\n\
+                  float32[] coef_z\nfloat32[] duration\n";
+    let written = |schema: &str, definition: &str| {
+        let mut out = mcap::Writer::new(std::io::Cursor::new(Vec::new())).expect("a writer");
+        let schema = out.add_schema(schema, "ros2msg", definition.as_bytes()).expect("a schema");
+        let channel_id = out.add_channel(schema, TOPIC, "cdr", &std::collections::BTreeMap::new()).expect("a channel");
+        let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 7, publish_time: 7 };
+        out.write_to_known_channel(&header, &cdr(&polynomials(2), true)).expect("a message");
+        out.finish().expect("finished");
+        let bytes = out.into_inner().into_inner();
+        read_bytes("plan.mcap", &bytes, &ReadOptions::default())
+    };
+    let found = written("other_planner/msg/Polynomials", fields).expect("read");
+    assert_near(position(&found, "2", 1.0), [0.5, 0.25, 1.0]);
+    assert!(!found.notes.iter().any(|note| note.contains("the names of schemas decide")), "{:?}", found.notes);
+    // Negative twin: a known name with fields in another order.
+    let other = fields.replace("uint8 order\nfloat32[] coef_x\n", "float32[] coef_x\nuint8 order\n");
+    let error = written(POLYNOMIALS, &other).expect_err("other fields");
+    assert_refused(&error, "recording/unsupported-format", &format!("curve 1 on topic `{TOPIC}`"));
+    assert!(error.to_string().contains("float32[] coef_x, uint8 order"), "{error}");
+}

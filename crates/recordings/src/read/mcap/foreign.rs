@@ -56,7 +56,7 @@ impl Rows for ForeignRows {
             match part {
                 Part::Message(message) => poses.take(&message, rows)?,
                 Part::Topic(topic) => *listed &= is_list(&topic.schema) || reader_of_topic(topic).is_none(),
-                Part::Schema(_) | Part::Other => {}
+                Part::Schema(..) | Part::Other => {}
             }
             Ok(())
         })?;

@@ -368,16 +368,6 @@ struct FrameTransforms {
     transforms: Vec<FrameTransform>,
 }
 
-/// Schemas of the curves of planners.
-pub(super) const B_SPLINE: &str = "traj_utils/msg/Bspline";
-pub(super) const MINCO: &str = "traj_utils/msg/MINCOTraj";
-pub(super) const POLYNOMIALS: &str = "traj_utils/msg/PolyTraj";
-
-/// Returns whether the messages of a schema are curves of a planner.
-pub(super) fn is_curve(schema: &str) -> bool {
-    matches!(schema, B_SPLINE | MINCO | POLYNOMIALS)
-}
-
 #[cfg(test)]
 mod tests {
     use super::{FIXES, live_poses};

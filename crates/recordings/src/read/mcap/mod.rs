@@ -16,6 +16,7 @@
 
 pub(super) mod bag;
 mod clocks;
+mod definition;
 mod foreign;
 mod messages;
 mod outline;
@@ -52,12 +53,12 @@ enum Origin {
 /// Returns the origin of a file by its first known schema.
 fn origin(topics: &mut TopicReader) -> Result<Option<Origin>, ReadError> {
     while let Some(part) = topics.next()? {
-        let Part::Schema(name) = part else { continue };
+        let Part::Schema(name, definition) = part else { continue };
         let is_export = name == own::TRACKS.schema_name;
         let origin = match name {
             SWARM_SCHEMA => Some(Origin::Run),
             _ if is_export => Some(Origin::Export),
-            _ if messages::is_curve(name) => Some(Origin::Foreign),
+            _ if definition::curve_kind(name, definition).is_some() => Some(Origin::Foreign),
             _ => messages::reader_of(name).map(|_| Origin::Foreign),
         };
         if origin.is_some() {

@@ -8,7 +8,8 @@ use super::super::earth::is_no_fix;
 use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::super::heading::Words;
 use super::clocks::Clocks;
-use super::messages::{EARTH, FIXES, Observation, PoseKind, VehicleKey, is_curve, is_of_transforms, reader_of_topic};
+use super::definition::is_curve;
+use super::messages::{EARTH, FIXES, Observation, PoseKind, VehicleKey, is_of_transforms, reader_of_topic};
 use super::split::SplitFiles;
 use super::tree::{FramePose, Tree, VehicleFrame};
 use crate::mcap::topic::{DeclaredTopic, Message, Part};
@@ -70,7 +71,7 @@ impl Outline {
         let (mut outline, mut number) = (Self { named: named.to_vec(), ..Self::default() }, 0);
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
-            if is_curve(&message.of.schema) {
+            if is_curve(message.of) {
                 let list = if outline.reads(message.of) { &mut outline.curves } else { &mut outline.unread };
                 if !list.contains(&message.of.topic) {
                     list.insert(message.of.topic.clone());

@@ -1,16 +1,15 @@
-//! Reads curves of planners: `traj_utils/msg/Bspline` of EGO-Planner, and `traj_utils/msg/MINCOTraj` and
-//! `traj_utils/msg/PolyTraj` of its version 2.
+//! Reads curves of planners: `traj_utils/msg/Bspline` and `traj_utils/msg/MultiBsplines` of EGO-Planner, and
+//! `traj_utils/msg/MINCOTraj` and `traj_utils/msg/PolyTraj` of its version 2. The definitions in the bag decide.
 //!
 //! A curve of a drone is flown from its start until the next one of that drone starts. The whole curve is a published
-//! plan ([`Published`]). The trajectory server of the
-//! first version holds the last point of a curve. That of the second version sends nothing after the end: the motion is
-//! unknown there.
+//! plan ([`Published`]). The trajectory server of the first version holds the last point of a curve. That of the second
+//! version sends nothing after the end: the motion is unknown there.
 //!
 //! A B-spline has its degree in `order`, and its time 0 at the knot with this index. A MINCO trajectory of order 5 is
 //! the curve of least jerk through its points. A polynomial trajectory of order 5 has six coefficients of each piece,
 //! the highest power of the time since its start first.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -21,10 +20,11 @@ use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
 use super::super::spline::{Part, b_spline, minimum_jerk};
-use super::messages::{MINCO, POLYNOMIALS, is_curve, nanoseconds};
+use super::definition::{CurveKind, curve_kind, fields};
+use super::messages::nanoseconds;
 use super::outline::Outline;
 use super::split::SplitFiles;
-use crate::mcap::topic::{CDR, Part as FilePart, decode};
+use crate::mcap::topic::{CDR, DeclaredTopic, Part as FilePart, decode};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::{CLOCK, DUPLICATES, FRAME, ORIGIN, SORT, TOPIC};
 use tautline_core::text::counted;
@@ -67,36 +67,33 @@ pub(super) fn open(
         return refuse(ContentKind::UnusedOption, why, format!("omit {option}"));
     }
     let (mut drones, mut number) = (BTreeMap::<i32, BTreeMap<i64, Plan>>::new(), 0);
-    let (mut repeated, mut published) = (0, Vec::new());
+    let (mut repeated, mut published, mut undefined) = (0, Vec::new(), BTreeSet::new());
     splits.visit_all(|part| {
         let FilePart::Message(message) = part else { return Ok(()) };
-        if !outline.curves.contains(&message.of.topic) || !is_curve(&message.of.schema) {
+        let Some(kind) = curve_kind(&message.of.schema, &message.of.definition) else { return Ok(()) };
+        if !outline.curves.contains(&message.of.topic) {
             return Ok(());
         }
         number += 1;
         let place = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
-        let read = match &*message.of.schema {
-            MINCO => Plan::of_minco,
-            POLYNOMIALS => Plan::of_polynomials,
-            _ => Plan::of_b_spline,
-        };
-        let (drone, plan) = read(&message.of.encoding, message.bytes).map_err(|fault| fault.at(place()))?;
-        let start_ns = plan.start_ns;
-        match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
-            None => {
-                published.push((i64::try_from(message.log_ns).unwrap_or(i64::MAX), drone, start_ns));
-                Ok(())
-            }
-            Some(known) if known == plan => {
-                repeated += 1;
-                Ok(())
-            }
-            Some(_) => {
-                let problem = format!("another curve of drone {drone} starts at {start_ns} ns");
-                let remedy = format!("record each planner on a topic of its own, and choose the topics with {TOPIC}");
-                Err(Fault::content(ContentKind::DuplicateRow, problem, remedy).at(place()))
+        if message.of.definition.is_empty() {
+            undefined.insert(message.of.topic.clone());
+        }
+        let plans = Plan::all_of(kind, message.of, message.bytes).map_err(|fault| fault.at(place()))?;
+        for (drone, plan) in plans {
+            let start_ns = plan.start_ns;
+            match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
+                None => published.push((i64::try_from(message.log_ns).unwrap_or(i64::MAX), drone, start_ns)),
+                Some(known) if known == plan => repeated += 1,
+                Some(_) => {
+                    let problem = format!("another curve of drone {drone} starts at {start_ns} ns");
+                    let remedy =
+                        format!("record each planner on a topic of its own, and choose the topics with {TOPIC}");
+                    return Err(Fault::content(ContentKind::DuplicateRow, problem, remedy).at(place()));
+                }
             }
         }
+        Ok(())
     })?;
     let first_ns = drones.values().flat_map(BTreeMap::keys).min().copied().unwrap_or(0);
     let epoch_ns = first_ns.div_euclid(NS_PER_S).saturating_mul(NS_PER_S);
@@ -106,6 +103,10 @@ pub(super) fn open(
         counted(drones.values().map(|curves| curves.len() as u64).sum(), "curve", "curves"),
         counted(drones.len() as u64, "drone", "drones")
     ));
+    if !undefined.is_empty() {
+        let topics = undefined.iter().map(|topic| quoted(topic)).collect::<Vec<_>>().join(", ");
+        notes.push(format!("without definitions of messages, the names of schemas decide how they are read: {topics}"));
+    }
     if repeated > 0 {
         notes.push(format!(
             "{} repeated with the same content, and read once",
@@ -234,9 +235,30 @@ impl Plan {
         value(coefficients, to_s - from_s)
     }
 
-    /// Returns the drone and the curve of a message.
-    fn of_b_spline(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
-        let Bspline { drone, degree, start, knots, points, .. } = decoded(encoding, bytes)?;
+    /// Returns the drones and the curves of a message. A list of B-splines has elements without points for drones that
+    /// have published nothing.
+    fn all_of(kind: CurveKind, topic: &DeclaredTopic, bytes: &[u8]) -> Result<Vec<(i32, Self)>, Fault> {
+        let encoding = &*topic.encoding;
+        match kind {
+            CurveKind::BSpline => Ok(vec![Self::of_b_spline(decoded(encoding, bytes)?)?]),
+            CurveKind::BSplines => {
+                let (_from, list): (i32, Vec<Bspline>) = decoded(encoding, bytes)?;
+                let published = list.into_iter().filter(|spline| !(spline.points.is_empty() && spline.knots.is_empty()));
+                published.map(Self::of_b_spline).collect()
+            }
+            CurveKind::Minco => Ok(vec![Self::of_minco(encoding, bytes)?]),
+            CurveKind::Polynomials => Ok(vec![Self::of_polynomials(encoding, bytes)?]),
+            CurveKind::Unsupported => {
+                let found = fields(&topic.definition).replace('\n', ", ");
+                let problem = format!("the definition of {} has other fields: {found}", quoted(&topic.schema));
+                refuse(ContentKind::UnsupportedFormat, problem, replan())
+            }
+        }
+    }
+
+    /// Returns the drone and the curve of a B-spline.
+    fn of_b_spline(message: Bspline) -> Result<(i32, Self), Fault> {
+        let Bspline { drone, degree, start, knots, points, .. } = message;
         let Some(degree) = usize::try_from(degree).ok().filter(|degree| (1..=HIGHEST_DEGREE).contains(degree)) else {
             let problem = format!("order: must be 1 to {HIGHEST_DEGREE}, got {degree}");
             return refuse(ContentKind::Degree, problem, replan());
