@@ -15,61 +15,62 @@ from typing import NamedTuple
 EPOCH_S = 1_700_000_000
 NS_PER_S = 1_000_000_000
 
-BSPLINE = """int32 drone_id
-int32 order
-int64 traj_id
-builtin_interfaces/Time start_time
-float64[] knots
-geometry_msgs/Point[] pos_pts
-float64[] yaw_pts
-float64 yaw_dt
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-"""
+#: Types of the fields, as a definition has them after its own fields.
+TYPES = {
+    "builtin_interfaces/Time": ["int32 sec", "uint32 nanosec"],
+    "geometry_msgs/Point": ["float64 x", "float64 y", "float64 z"],
+}
 
-MINCO = """int16 drone_id
-int32 traj_id
-builtin_interfaces/Time start_time
-float32 des_clearance
-uint8 order
-float32[3] start_p
-float32[3] start_v
-float32[3] start_a
-float32[3] end_p
-float32[3] end_v
-float32[3] end_a
-float32[] inner_x
-float32[] inner_y
-float32[] inner_z
-float32[] duration
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
+BSPLINE = [
+    "int32 drone_id",
+    "int32 order",
+    "int64 traj_id",
+    "builtin_interfaces/Time start_time",
+    "float64[] knots",
+    "geometry_msgs/Point[] pos_pts",
+    "float64[] yaw_pts",
+    "float64 yaw_dt",
+]
 
-POLYNOMIALS = """int16 drone_id
-int32 traj_id
-builtin_interfaces/Time start_time
-uint8 order
-float32[] coef_x
-float32[] coef_y
-float32[] coef_z
-float32[] duration
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
+MINCO = [
+    "int16 drone_id",
+    "int32 traj_id",
+    "builtin_interfaces/Time start_time",
+    "float32 des_clearance",
+    "uint8 order",
+    "float32[3] start_p",
+    "float32[3] start_v",
+    "float32[3] start_a",
+    "float32[3] end_p",
+    "float32[3] end_v",
+    "float32[3] end_a",
+    "float32[] inner_x",
+    "float32[] inner_y",
+    "float32[] inner_z",
+    "float32[] duration",
+]
+
+POLYNOMIALS = [
+    "int16 drone_id",
+    "int32 traj_id",
+    "builtin_interfaces/Time start_time",
+    "uint8 order",
+    "float32[] coef_x",
+    "float32[] coef_y",
+    "float32[] coef_z",
+    "float32[] duration",
+]
 
 Point = tuple[float, float, float]
+
+
+def definition(fields: list[str]) -> str:
+    """Returns the definition of a message with the types of its fields."""
+    text = "".join(field + "\n" for field in fields)
+    for name, own in TYPES.items():
+        if any(field.startswith(name) for field in fields):
+            text += "=" * 80 + f"\nMSG: {name}\n" + "".join(field + "\n" for field in own)
+    return text
 
 
 class Message(NamedTuple):
@@ -121,7 +122,7 @@ def spline(drone: int, start_s: float, interval_s: float, points: list[Point], t
     cdr.add("d", *(number for point in points for number in point))
     cdr.sequence("d", [])
     cdr.add("d", 0.0)
-    return Message(topic, "traj_utils/msg/Bspline", BSPLINE, nanoseconds(start_s), cdr.message())
+    return Message(topic, "traj_utils/msg/Bspline", definition(BSPLINE), nanoseconds(start_s), cdr.message())
 
 
 def minco(
@@ -143,7 +144,8 @@ def minco(
     for axis in range(3):
         cdr.sequence("f", [point[axis] for point in points[1:-1]])
     cdr.sequence("f", durations_s)
-    return Message("/broadcast_traj", "traj_utils/msg/MINCOTraj", MINCO, nanoseconds(start_s), cdr.message())
+    schema = "traj_utils/msg/MINCOTraj"
+    return Message("/broadcast_traj", schema, definition(MINCO), nanoseconds(start_s), cdr.message())
 
 
 def line(drone: int, start_s: float, start: Point, velocity: Point, durations_s: list[float]) -> Message:
@@ -160,7 +162,8 @@ def line(drone: int, start_s: float, start: Point, velocity: Point, durations_s:
             at += velocity[axis] * duration_s
         cdr.sequence("f", coefficients)
     cdr.sequence("f", durations_s)
-    return Message("/trajectory", "traj_utils/msg/PolyTraj", POLYNOMIALS, nanoseconds(start_s), cdr.message())
+    schema = "traj_utils/msg/PolyTraj"
+    return Message("/trajectory", schema, definition(POLYNOMIALS), nanoseconds(start_s), cdr.message())
 
 
 def present_positions(aside_m: float) -> list[Message]:

@@ -326,11 +326,15 @@ impl fmt::Display for Fact {
             FactKind::PlanMotion => write!(out, "{subject} is straight between samples"),
             FactKind::PlanHeights => out.write_str("the heights of flight and plan have one reference"),
             FactKind::PlanPlane => out.write_str("flight and plan have equal heights, which are not compared"),
-            FactKind::PlanEnd => write!(out, "after the end of its plan {}", match value.as_str() {
-                "hold" => "each vehicle holds the last point",
-                "continue" => "each vehicle flies on with its last velocity",
-                _ => "the motion of each vehicle is unknown",
-            }),
+            FactKind::PlanEnd => write!(
+                out,
+                "after the end of its plan {}",
+                match value.as_str() {
+                    "hold" => "each vehicle holds the last point",
+                    "continue" => "each vehicle flies on with its last velocity",
+                    _ => "the motion of each vehicle is unknown",
+                }
+            ),
             FactKind::PlanPublication => write!(out, "plans are published at {value}"),
             FactKind::MeanAcceleration => write!(out, "accelerations are means over {value}"),
             FactKind::SampledAcceleration => {

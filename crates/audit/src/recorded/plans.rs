@@ -8,7 +8,8 @@
 //! ended.
 //!
 //! The distances are those of [`audit`](super::audit): enclosed on curves by Bernstein coefficients, and checked by
-//! parry. A bound on the motion of both plans leaves out pairs that are neither below their limit nor among the closest.
+//! parry. A bound on the motion of two plans leaves out those that are neither below their limit nor among the
+//! closest.
 
 use std::collections::BTreeMap;
 use std::mem;
@@ -331,9 +332,9 @@ impl PlanAuditor {
         vehicle.check(&self.settings, false)?;
         let segments = mem::take(&mut vehicle.segments);
         let (Some(first), Some(last)) = (segments.first(), segments.last()) else { return Ok(None) };
-        let velocity = last.curve().map_or_else(Vector3::zeros, |curve| {
-            derivative(&curve.coefficients, curve.to_s - curve.from_s)
-        });
+        let velocity = last
+            .curve()
+            .map_or_else(Vector3::zeros, |curve| derivative(&curve.coefficients, curve.to_s - curve.from_s));
         let chords: Vec<_> = segments.iter().map(Chord::new).collect();
         Ok(Some(Known {
             reference,
@@ -406,8 +407,12 @@ impl PlanAuditor {
             ..Results::bounded(self.results.interruption.clone())
         };
         let (target, keep_out, above) = (self.limits.target(), KeepOut::new(limit_m), self.limits.above);
-        PairSweep { pair: objects, target, keep_out, cutoff, judges: true, may_violate: true, above }
-            .judge(&first, &second, window, &mut results);
+        PairSweep { pair: objects, target, keep_out, cutoff, judges: true, may_violate: true, above }.judge(
+            &first,
+            &second,
+            window,
+            &mut results,
+        );
         self.results.closest = results.closest;
         let after = self.results.closest.kept.iter().find(|kept| kept.pair == objects).copied();
         let [plan, other] = [known, other].map(|known| known.reference);

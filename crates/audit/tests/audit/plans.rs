@@ -71,11 +71,10 @@ fn only_plans_that_are_valid_at_the_publication_count() {
     // From 2 s on the first vehicle turns aside.
     let turn = plan(0, 2.0, &[(2.0, 10.0)], &[[2.0, 0.0, 1.0], [0.0, 1.0, 0.0]]);
     // Published before the turn, the plan is in conflict; published after it, the plan is clear.
-    assert_eq!(violations(&judged(PlanEnd::Hold, &[first.clone(), towards(1.0), turn.clone()])), [(
-        (1, 1),
-        (0, 1),
-        5.0
-    )]);
+    assert_eq!(
+        violations(&judged(PlanEnd::Hold, &[first.clone(), towards(1.0), turn.clone()])),
+        [((1, 1), (0, 1), 5.0)]
+    );
     assert_eq!(judged(PlanEnd::Hold, &[first.clone(), turn, towards(3.0)]).status, Status::Clear);
     // A later start keeps the earlier plan until then.
     let late = plan(0, 2.0, &[(6.0, 10.0)], &[[6.0, 0.0, 1.0], [0.0, 1.0, 0.0]]);

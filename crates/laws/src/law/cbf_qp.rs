@@ -1,9 +1,9 @@
 //! Control barrier functions: the acceleration nearest to that of a nominal controller that keeps every pair able to
 //! brake.
 //!
-//! This is the nominal variant of L. Wang, A. D. Ames and M. Egerstedt (IEEE Transactions on Robotics 33, 661, 2017): its
-//! pairwise barriers. Section VI of the paper adds barriers of braking (15) and a braking controller (17), which keep the
-//! program feasible. They are not a part of this law.
+//! This is the nominal variant of L. Wang, A. D. Ames and M. Egerstedt (IEEE Transactions on Robotics 33, 661, 2017):
+//! its pairwise barriers. Section VI of the paper adds barriers of braking (15) and a braking controller (17), which
+//! keep the program feasible. They are not a part of this law.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -93,11 +93,8 @@ impl Answer {
                 format!("published plans never come{closest}")
             }
             Status::Violation => {
-                let deepest = self
-                    .violations
-                    .listed
-                    .iter()
-                    .min_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
+                let deepest =
+                    self.violations.listed.iter().min_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
                 let others = match self.violations.count {
                     ..=1 => String::new(),
                     count => format!("; {count} violations of plans in all"),

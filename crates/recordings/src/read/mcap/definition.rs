@@ -108,7 +108,8 @@ mod tests {
     fn a_list_of_b_splines_needs_their_definition() {
         let list = |element: &str| {
             let end = "================================================================================\n";
-            let text = format!("int32 drone_id_from\ntraj_utils/Bspline[] traj\n{end}MSG: traj_utils/Bspline\n{element}");
+            let list = "int32 drone_id_from\ntraj_utils/Bspline[] traj\n";
+            let text = format!("{list}{end}MSG: traj_utils/Bspline\n{element}");
             curve_kind("traj_utils/msg/MultiBsplines", &text)
         };
         assert_eq!(list(B_SPLINE), Some(CurveKind::BSplines));

@@ -243,8 +243,8 @@ impl Plan {
             CurveKind::BSpline => Ok(vec![Self::of_b_spline(decoded(encoding, bytes)?)?]),
             CurveKind::BSplines => {
                 let (_from, list): (i32, Vec<Bspline>) = decoded(encoding, bytes)?;
-                let published = list.into_iter().filter(|spline| !(spline.points.is_empty() && spline.knots.is_empty()));
-                published.map(Self::of_b_spline).collect()
+                let is_published = |spline: &Bspline| !(spline.points.is_empty() && spline.knots.is_empty());
+                list.into_iter().filter(is_published).map(Self::of_b_spline).collect()
             }
             CurveKind::Minco => Ok(vec![Self::of_minco(encoding, bytes)?]),
             CurveKind::Polynomials => Ok(vec![Self::of_polynomials(encoding, bytes)?]),

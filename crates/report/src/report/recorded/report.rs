@@ -7,8 +7,8 @@ use crate::report::answer::{Answer, Detectors, Finding, FindingList, Judgement, 
 use crate::report::flight::{SCHEMA_VERSION, finite};
 use tautline_audit::envelope::{self, Corner, Exceedance, LimitOutcome};
 use tautline_audit::recorded::{
-    Absence, Contradiction, ExemptTime, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_CYLINDER,
-    PlanConflict, PlanReference, PlansOutcome, TOUCHING_ELLIPSOIDS, WellClearLoss, WellClearOutcome,
+    Absence, Contradiction, ExemptTime, Gap, ObjectPair, Outcome, PlanConflict, PlanReference, PlansOutcome, Presence,
+    Settings, TOUCHING_CYLINDER, TOUCHING_ELLIPSOIDS, WellClearLoss, WellClearOutcome,
 };
 use tautline_audit::{Status, Tally};
 use tautline_core::fact::{BOUNDED, Fact, FactKind, RUN_AUDIT, Source as FactSource};
@@ -308,8 +308,7 @@ impl RecordedReport {
     pub fn with_published_plans(mut self, found: &PlansOutcome) -> Self {
         let unit = self.unit();
         let name = |plan: PlanReference| self.vehicles.get(plan.vehicle).cloned().unwrap_or_default();
-        let conflict =
-            |found: &PlanConflict| Finding::plan_conflict(found, [found.plan, found.other].map(name), unit);
+        let conflict = |found: &PlanConflict| Finding::plan_conflict(found, [found.plan, found.other].map(name), unit);
         let closest = found.closest.iter();
         let closest =
             closest.map(|found| Finding::plan_approach(found, [found.plan, found.other].map(name), unit)).collect();

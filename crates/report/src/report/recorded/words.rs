@@ -330,7 +330,12 @@ impl RecordedReport {
         ];
         let against_plan = self.plan.iter().flat_map(PlanReport::sections);
         let closest = [closest(false), closest(true)].into_iter().flatten();
-        closest.chain(of_published).chain(sections).chain(against_plan).filter(|section| !section.rows.is_empty()).collect()
+        closest
+            .chain(of_published)
+            .chain(sections)
+            .chain(against_plan)
+            .filter(|section| !section.rows.is_empty())
+            .collect()
     }
 
     /// Returns the lists that are cut, a sentence each.

@@ -34,7 +34,9 @@ use crate::report::Status;
 use crate::report::recorded::{Clock, RecordedReport, Source};
 use replays::Instants;
 use side_files::{ItemSpan, SideFiles};
-use tautline_audit::recorded::{ObjectPair, Outcome, PairSample, PairSeries, PlansOutcome, Presence, Settings, TrackAuditor};
+use tautline_audit::recorded::{
+    ObjectPair, Outcome, PairSample, PairSeries, PlansOutcome, Presence, Settings, TrackAuditor,
+};
 use tautline_audit::{MovingObstacle, Violation, are_decimals_apart};
 use tautline_core::fact::{Fact, FactKind, Source as FactSource};
 use tautline_core::files::write_atomically;

@@ -118,8 +118,8 @@ pub struct AuditOptions {
     #[cfg_attr(feature = "cli", arg(long = "tube", value_name = "METRES", requires = "plan"))]
     #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
     pub tube_m: Option<f64>,
-    /// What a vehicle does after the end of a plan that a planner published: hold the last point, continue with the
-    /// last velocity, or unknown, which is not judged [default: the rule of the planner, or hold].
+    /// Motion after the end of a planner's plan: hold the last point, continue with the last velocity, or unknown,
+    /// which is not judged [default: hold].
     #[serde(deserialize_with = "parsed")]
     #[cfg_attr(feature = "cli", arg(long, value_name = "END"))]
     pub plan_end: Option<PlanEnd>,
