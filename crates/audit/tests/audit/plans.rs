@@ -194,8 +194,9 @@ proptest! {
         let number = |k: usize| plans[..=k].iter().filter(|plan| plan.vehicle == plans[k].vehicle).count() as u64;
         for (k, other, time_s) in &below {
             let is_found = outcome.violations.iter().any(|found| {
-                found.plan.vehicle == plans[*k].vehicle && found.plan.number == number(*k) && found.other.vehicle == *other
-                    && found.from_s - 1e-9 <= *time_s && *time_s <= found.to_s + 1e-9
+                let is_of = (found.plan.vehicle, found.plan.number, found.other.vehicle);
+                let spans = found.from_s - 1e-9 <= *time_s && *time_s <= found.to_s + 1e-9;
+                is_of == (plans[*k].vehicle, number(*k), *other) && spans
             });
             prop_assert!(is_found, "{k} {other} {time_s} {:?}", outcome.violations);
         }
