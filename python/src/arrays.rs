@@ -2,7 +2,7 @@
 
 use numpy::ndarray::{ArrayView1, ArrayView3};
 use tautline::read::{ContentKind, Fault, Place, ReadError};
-use tautline::track::{Item, Metadata, Sample, Tracks};
+use tautline::track::{Item, Metadata, Plan, Sample, Tracks};
 
 /// Approximate number of items of a batch, small enough for the processor's cache.
 const BATCH: usize = 4096;
@@ -134,5 +134,9 @@ impl Tracks for Arrays<'_> {
 
     fn metadata(&self) -> &Metadata {
         &self.metadata
+    }
+
+    fn plans(&self) -> &[Plan] {
+        &[]
     }
 }

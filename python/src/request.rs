@@ -40,7 +40,7 @@ impl ReadOptions {
     #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
     #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, skip_incomplete,
                         distinct, clock, scale, axes, dimensions, column, start, layout, frame, topic, origin,
-                        allow_unfinished))]
+                        plan_end, allow_unfinished))]
     #[allow(clippy::fn_params_excessive_bools)]
     fn new(
         format: Option<String>,
@@ -62,6 +62,7 @@ impl ReadOptions {
         frame: Option<String>,
         topic: Vec<String>,
         origin: Option<[f64; 3]>,
+        plan_end: Option<String>,
         allow_unfinished: bool,
     ) -> PyResult<Self> {
         if [fps.is_some(), time_scale.is_some(), time_unit.is_some()].iter().filter(|is_given| **is_given).count() > 1 {
@@ -103,6 +104,7 @@ impl ReadOptions {
             frame,
             topics: topic,
             origin,
+            plan_end: parsed("plan_end", plan_end)?,
             allow_unfinished,
             ..read::ReadOptions::default()
         }))

@@ -25,7 +25,7 @@ MISSING_FILE_CODES = (
 PathLike = str | os.PathLike[str]
 
 if TYPE_CHECKING:
-    from ._words import Duplicates, MessageClock, ReadFormat, TimeUnit
+    from ._words import Duplicates, MessageClock, PlanEnd, ReadFormat, TimeUnit
 
 #: Largest integer up to which every integer is a float64.
 EXACT_INTEGER = 2**53
@@ -123,6 +123,7 @@ class ReadOptions(TypedDict, total=False):
     frame: str | None
     topic: str | Sequence[str] | None
     origin: Iterable[float] | None
+    plan_end: PlanEnd | None
     join: bool
     allow_unfinished: bool
 
@@ -282,6 +283,7 @@ def read_options(
     frame: str | None = None,
     topic: str | Sequence[str] | None = None,
     origin: Iterable[float] | None = None,
+    plan_end: str | None = None,
     join: bool = False,
     allow_unfinished: bool = False,
 ) -> _native.ReadOptions:
@@ -310,6 +312,7 @@ def read_options(
         frame=optional_text(frame, "frame"),
         topic=[topic] if isinstance(topic, str) else name_list(topic or [], "topic"),
         origin=optional_vector(origin, "origin"),
+        plan_end=optional_text(plan_end, "plan_end"),
         allow_unfinished=boolean(allow_unfinished, "allow_unfinished"),
     )
 

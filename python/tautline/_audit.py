@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from typing_extensions import Unpack
 
-    from ._words import Motion, PlanEnd, Rules
+    from ._words import Motion, Rules
 
 #: Times (K,) and positions (K, 3) of vehicles, by name.
 Tracks = Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
@@ -65,7 +65,6 @@ CHECKS: dict[str, Callable[[object, str], object]] = {
     "plan": optional_path,
     "plan_delay": optional_number,
     "tube": optional_number,
-    "plan_end": optional_text,
     "accel_window": optional_number,
     "config": lambda value, what: False if value is False else optional_path(value, what),
     "from_s": optional_number,
@@ -250,7 +249,6 @@ class AuditOptions(TypedDict, total=False):
     plan: PathLike | None
     plan_delay: float | None
     tube: float | None
-    plan_end: PlanEnd | None
     accel_window: float | None
     config: PathLike | Literal[False] | None
     from_s: float | None
@@ -292,7 +290,8 @@ def audit(
 
     ``tl.audit("flight.mcap")`` audits a file or folder, or with ``join=True`` a list of files with one vehicle each.
     These options control reading: `format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, skip_incomplete,
-    distinct, clock, scale, axes, dimensions, column, start, layout, frame, topic, origin, allow_unfinished`.
+    distinct, clock, scale, axes, dimensions, column, start, layout, frame, topic, origin,
+    plan_end, allow_unfinished`.
 
     * ``delta``: safety distance of two centres [m].
     * ``radius``: radius of all vehicles, or by name [m]; the limit of a pair is max(delta, r1 + r2).
@@ -310,7 +309,6 @@ def audit(
     * ``plan``: file of the plan, whose curves are compared with the flight, vehicle by vehicle.
     * ``plan_delay``: time of the flight at which the plan has time 0 [s], estimated unless given.
     * ``tube``: largest allowed distance from the plan [m].
-    * ``plan_end``: motion after the end of a plan that a planner published: ``hold``, ``continue`` or ``unknown``.
     * ``config``: ``tautline.toml`` with defaults for arguments that are not given. For a recording the default is the
       ``tautline.toml`` beside it. False reads no file.
     * ``from_s``, ``until_s``: window of the audit [s].

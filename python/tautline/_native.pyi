@@ -338,6 +338,7 @@ class ReadOptions:
         frame: str | None,
         topic: Sequence[str],
         origin: Sequence[float] | None,
+        plan_end: str | None,
         allow_unfinished: bool,
     ) -> ReadOptions: ...
 

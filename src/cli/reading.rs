@@ -7,11 +7,12 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PathBufValueParser, PossibleValue, TypedValueParser};
 
+#[cfg(feature = "viewer")]
+use tautline_core::track::PlanEnd;
 use tautline_recordings::read::{
     ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, MessageClock, ReadOptions, Scale,
     TimeUnit,
 };
-#[cfg(feature = "viewer")]
 use tautline_report::request::Failure;
 use tautline_report::request::audit::recording_in;
 use tautline_report::request::one_of;
@@ -93,6 +94,10 @@ pub(super) struct ReadArguments {
     /// Origin of geographic positions: degrees, and metres above the ellipsoid [default: the first position].
     #[arg(long, value_name = "LAT,LON,HEIGHT", value_parser = origin, allow_hyphen_values = true)]
     origin: Option<[f64; 3]>,
+    /// Motion after the end of a planner's plan: hold the last point, continue with the last velocity, or unknown,
+    /// which is not judged [default: hold].
+    #[arg(long, value_name = "END")]
+    plan_end: Option<PlanEnd>,
     /// Accept an MCAP file that was not closed, and read its contents.
     #[arg(long)]
     allow_unfinished: bool,
@@ -141,6 +146,7 @@ impl ReadArguments {
             frame: self.frame.clone(),
             topics: self.topics.clone(),
             origin: self.origin,
+            plan_end: self.plan_end,
             allow_unfinished: self.allow_unfinished,
             ..ReadOptions::default()
         }

@@ -14,7 +14,7 @@ use super::recognition::head_of;
 use super::source::{Archive, Source, VehicleFiles};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::TIME_UNIT;
-use tautline_core::track::{Clock, Item, Metadata, Tracks};
+use tautline_core::track::{Clock, Item, Metadata, Plan, Tracks};
 
 /// Longest number in a file name that is sorted by value \[digits\].
 const LONGEST_NUMBER: usize = 20;
@@ -419,6 +419,10 @@ impl Tracks for Joined {
 
     fn metadata(&self) -> &Metadata {
         &self.metadata
+    }
+
+    fn plans(&self) -> &[Plan] {
+        &[]
     }
 }
 

@@ -9,9 +9,10 @@ use super::error::{ContentKind, Fault, quoted, refuse};
 use super::format::{Format, FormatOption};
 use super::time_unit::TimeUnit;
 use tautline_core::option::{
-    ALLOW_UNFINISHED, AXES, CLOCK, COLUMN, DIMENSIONS, DUPLICATES, FPS, FRAME, LAYOUT, ONE_VEHICLE, ORIGIN, SCALE,
-    SKIP_INCOMPLETE, SORT, START, TIME_SCALE, TIME_UNIT, TOPIC,
+    ALLOW_UNFINISHED, AXES, CLOCK, COLUMN, DIMENSIONS, DUPLICATES, FPS, FRAME, LAYOUT, ONE_VEHICLE, ORIGIN, PLAN_END,
+    SCALE, SKIP_INCOMPLETE, SORT, START, TIME_SCALE, TIME_UNIT, TOPIC,
 };
+use tautline_core::track::PlanEnd;
 
 /// Defines all variants of an option, and their names.
 macro_rules! named {
@@ -249,6 +250,8 @@ pub struct ReadOptions {
     /// Origin of places on the Earth: latitude and longitude \[degrees\], height above the ellipsoid \[m\]; by default
     /// the first place.
     pub origin: Option<[f64; 3]>,
+    /// Motion of a vehicle after the end of its published plan; by default it holds the last point.
+    pub plan_end: Option<PlanEnd>,
     /// Whether to read the complete part of an MCAP file or PX4 log that was not closed.
     pub allow_unfinished: bool,
 }
@@ -316,7 +319,7 @@ impl ReadOptions {
         let (is_turned, has_columns) = (!self.turn().is_identity(), self.columns != ColumnNames::default());
         let is_one_vehicle = self.one_vehicle && !self.is_joined;
         let rate = format!("{FPS} and {TIME_SCALE}");
-        let given: [(_, _, &dyn Display, _); 16] = [
+        let given: [(_, _, &dyn Display, _); 17] = [
             (self.time_unit.is_some(), FormatOption::TimeUnit, &TIME_UNIT, "has a fixed unit of time"),
             (self.times_per_second.is_some(), FormatOption::TimeUnit, &rate, "has a fixed unit of time"),
             (self.clock.is_some(), FormatOption::Clock, &CLOCK, "has no messages with log times"),
@@ -330,6 +333,7 @@ impl ReadOptions {
             (self.origin.is_some(), FormatOption::Origin, &ORIGIN, "has no latitudes and longitudes"),
             (self.frame.is_some(), FormatOption::Frame, &FRAME, "has no frames"),
             (!self.topics.is_empty(), FormatOption::Topics, &TOPIC, "has no topics"),
+            (self.plan_end.is_some(), FormatOption::Plans, &PLAN_END, "has no plans of a planner"),
             (is_turned, FormatOption::Axes, &AXES, "gives the directions of its axes"),
             (is_one_vehicle, FormatOption::OneVehicle, &ONE_VEHICLE, "names its vehicles"),
             (self.allow_unfinished, FormatOption::Unfinished, &ALLOW_UNFINISHED, "cannot be read before it is closed"),

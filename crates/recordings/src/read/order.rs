@@ -11,7 +11,7 @@ use super::error::{ContentKind, Fault, Place, ReadError, quoted};
 use super::options::{Duplicates, ReadOptions};
 use super::source::Source as File;
 use super::time_unit::TimeUnit;
-use tautline_core::track::{Item, Metadata, Sample, Tracks};
+use tautline_core::track::{Item, Metadata, Plan, Sample, Tracks};
 
 /// Longest step between two positions on the Earth that is accepted at any speed \[m\].
 const LONGEST_JUMP_M: f64 = 1000.0;
@@ -337,6 +337,10 @@ impl<R: Rows> Tracks for Ordered<R> {
 
     fn metadata(&self) -> &Metadata {
         &self.info.metadata
+    }
+
+    fn plans(&self) -> &[Plan] {
+        &[]
     }
 }
 

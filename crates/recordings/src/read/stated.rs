@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use nalgebra::Vector3;
+
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::{AXES, COLUMN, DISTINCT, SCALE, TOPIC};
-use tautline_core::track::{Item, Metadata, Sample, Tracks};
+use tautline_core::track::{Item, Metadata, Plan, Sample, Tracks};
 
 use super::axes::Axes;
 use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
@@ -32,7 +34,14 @@ pub(super) fn stated(recording: Recording, options: &ReadOptions, path: &Path) -
     let metadata = completed(recording.metadata(), options);
     let is_known = metadata.facts.iter().any(|fact| fact.kind == FactKind::Identity && fact.source == Source::Recorded);
     let twins = (!options.distinct && !is_known).then(Twins::default);
-    Ok(Box::new(Stated { recording, axes, metadata, path: path.to_owned(), options: options.clone(), twins }))
+    let mut plans = recording.plans().to_vec();
+    for piece in plans.iter_mut().flat_map(|plan| &mut plan.pieces) {
+        if metadata.is_planar {
+            piece.coefficients.iter_mut().for_each(flatten);
+        }
+        piece.coefficients.iter_mut().for_each(|coefficient| *coefficient = axes.turn(*coefficient));
+    }
+    Ok(Box::new(Stated { recording, axes, plans, metadata, path: path.to_owned(), options: options.clone(), twins }))
 }
 
 /// Returns metadata with a note on the axes and a fact of each kind that every recording has.
@@ -75,6 +84,8 @@ fn completed(metadata: &Metadata, options: &ReadOptions) -> Metadata {
 struct Stated {
     recording: Recording,
     axes: Axes,
+    /// Plans with these axes.
+    plans: Vec<Plan>,
     metadata: Metadata,
     path: PathBuf,
     options: ReadOptions,
@@ -93,7 +104,7 @@ impl Tracks for Stated {
         let before = items.len();
         let more = self.recording.read(items)?;
         if self.metadata.is_planar {
-            items[before..].iter_mut().for_each(flatten);
+            items[before..].iter_mut().for_each(flatten_item);
         }
         if !self.axes.is_identity() {
             items[before..].iter_mut().try_for_each(|item| turn(item, self.axes))?;
@@ -114,16 +125,25 @@ impl Tracks for Stated {
     fn metadata(&self) -> &Metadata {
         &self.metadata
     }
+
+    fn plans(&self) -> &[Plan] {
+        &self.plans
+    }
+}
+
+/// Removes the height.
+fn flatten(vector: &mut Vector3<f64>) {
+    vector.z = 0.0;
 }
 
 /// Removes the heights of a planar recording.
-fn flatten(item: &mut Item) {
+fn flatten_item(item: &mut Item) {
     match item {
         Item::Sample(sample) => {
-            sample.position_m.z = 0.0;
-            sample.velocity_m_s.iter_mut().for_each(|velocity| velocity.z = 0.0);
+            flatten(&mut sample.position_m);
+            sample.velocity_m_s.iter_mut().for_each(flatten);
         }
-        Item::Piece(piece) => piece.coefficients.iter_mut().for_each(|coefficient| coefficient.z = 0.0),
+        Item::Piece(piece) => piece.coefficients.iter_mut().for_each(flatten),
     }
 }
 

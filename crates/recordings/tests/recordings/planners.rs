@@ -3,7 +3,7 @@
 use std::fs;
 
 use nalgebra::Vector3;
-use tautline_core::track::{Item, Piece};
+use tautline_core::track::{Item, Piece, PlanEnd};
 use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
 
 use crate::messages::{Message, SEC, Stamp, cdr, header, mcap_of, read_bytes, whole};
@@ -130,7 +130,14 @@ fn a_b_spline_is_flown_until_the_next_one_starts_and_then_held() {
 fn a_minco_trajectory_passes_its_points_and_ends_unknown() {
     let mut next = minco(2, 0.0);
     next.2 = (SEC + 5, 0);
-    let found = whole("plan.mcap", &mcap_of(&[of_minco(&minco(2, 0.5)), of_minco(&next)]));
+    let unknown = ReadOptions { plan_end: Some(PlanEnd::Unknown), ..ReadOptions::default() };
+    let bytes = mcap_of(&[of_minco(&minco(2, 0.5)), of_minco(&next)]);
+    let found = read_bytes("plan.mcap", &bytes, &unknown).expect("read");
+    assert_eq!(found.assumed, Some("plans are published at their starts".to_owned()), "a declared end");
+    let held = whole("plan.mcap", &bytes);
+    assert_near(position(&held, "2", 4.0), [2.0, 0.0, 1.0]);
+    let assumed = held.assumed.expect("an assumption");
+    assert!(assumed.ends_with("after the end of its plan each vehicle holds the last point"), "{assumed}");
     for (time_s, expected) in [(0.5, [0.0, 0.0, 1.0]), (1.5, [1.0, 0.5, 1.0]), (2.5, [2.0, 0.0, 1.0])] {
         assert_near(position(&found, "2", time_s), expected);
     }
@@ -143,7 +150,14 @@ fn a_minco_trajectory_passes_its_points_and_ends_unknown() {
 fn polynomials_have_their_highest_power_first_and_end_unknown() {
     let mut next = polynomials(2);
     next.2 = (SEC + 5, 0);
-    let found = whole("plan.mcap", &mcap_of(&[of_polynomials(&polynomials(2)), of_polynomials(&next)]));
+    let read = |plan_end| {
+        let bytes = mcap_of(&[of_polynomials(&polynomials(2)), of_polynomials(&next)]);
+        read_bytes("plan.mcap", &bytes, &ReadOptions { plan_end: Some(plan_end), ..ReadOptions::default() })
+    };
+    // The first curve ends at 3.5 s with 2 m/s along y.
+    let continued = read(PlanEnd::Continue).expect("read");
+    assert_near(position(&continued, "2", 4.5), [1.0, 7.0, 1.0]);
+    let found = read(PlanEnd::Unknown).expect("read");
     for (time_s, expected) in
         [(0.5, [0.0, 0.0, 1.0]), (1.0, [0.5, 0.25, 1.0]), (1.5, [1.0, 1.0, 1.0]), (3.5, [1.0, 5.0, 1.0])]
     {
@@ -190,6 +204,8 @@ fn curves_beside_positions_need_a_topic() {
     let read = |topic| read_bytes("plan.mcap", &mcap_of(&both), &topics(&[topic])).expect("read");
     assert_eq!(read(TOPIC).vehicles, ["1"]);
     assert_eq!(read("/odom").samples().len(), 1);
+    let ended = ReadOptions { plan_end: Some(PlanEnd::Hold), ..topics(&["/odom"]) };
+    assert_refused(&refused(&both, &ended), "recording/unused-option", "");
     let framed = ReadOptions { frame: Some("map".to_owned()), ..ReadOptions::default() };
     assert_refused(&refused(&both[..1], &framed), "recording/unused-option", "");
 }

@@ -6,7 +6,7 @@ use super::*;
 use crate::error::FARTHEST_M;
 use tautline_audit::Violation;
 use tautline_core::swarm::{ClosestApproach, Pair};
-use tautline_core::track::{Item, Metadata, Tracks};
+use tautline_core::track::{Item, Metadata, Plan, Tracks};
 
 /// Recorded motion: vehicle, time, x and y of every sample; names; one radius for all; metadata.
 struct Seen(Vec<(usize, f64, f64, f64)>, Vec<String>, Option<f64>, Metadata);
@@ -30,6 +30,10 @@ impl Tracks for Seen {
 
     fn metadata(&self) -> &Metadata {
         &self.3
+    }
+
+    fn plans(&self) -> &[Plan] {
+        &[]
     }
 }
 

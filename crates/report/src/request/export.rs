@@ -11,7 +11,7 @@ use tautline_core::fact::Fact;
 use tautline_core::files::write_atomically_with;
 use tautline_core::option::{EXPORT_FORMAT, FORCE, OUTPUT, TIME_UNIT};
 use tautline_core::text::counted;
-use tautline_core::track::{Item, Metadata, Tracks};
+use tautline_core::track::{Item, Metadata, Plan, Tracks};
 use tautline_recordings::export::{self, ExportOptions, WRITTEN};
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions, Recording};
 
@@ -55,6 +55,10 @@ impl Tracks for Interruptible {
 
     fn metadata(&self) -> &Metadata {
         self.tracks.metadata()
+    }
+
+    fn plans(&self) -> &[Plan] {
+        self.tracks.plans()
     }
 }
 

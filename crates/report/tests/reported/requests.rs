@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use nalgebra::Vector3;
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::Interpolation;
-use tautline_core::track::{Item, Metadata, Sample, Tracks};
+use tautline_core::track::{Item, Metadata, Plan, Sample, Tracks};
 use tautline_recordings::read::{ReadError, ReadOptions};
 use tautline_report::request::audit::Open;
 use tautline_report::request::{
@@ -54,6 +54,10 @@ impl Tracks for Passing {
 
     fn metadata(&self) -> &Metadata {
         &self.metadata
+    }
+
+    fn plans(&self) -> &[Plan] {
+        &[]
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use tautline_core::fact::{self, Fact, FactKind};
-use tautline_core::option::{FRAME, TOPIC};
+use tautline_core::option::{FRAME, PLAN_END, TOPIC};
 
 use super::super::clock::Stamp;
 use super::super::earth::{is_no_fix, no_fixes};
@@ -25,6 +25,9 @@ pub(super) fn open(whole: &Source, mut splits: SplitFiles, options: &ReadOptions
     let outline = Outline::of(&mut splits, &options.topics)?;
     if let Some(curves) = planned::open(&outline, &mut splits, options)? {
         return Ok(curves);
+    }
+    if options.plan_end.is_some() {
+        return refuse(ContentKind::UnusedOption, "it has no plans of a planner", format!("omit {PLAN_END}"));
     }
     let plan = ReadPlan::of(outline, &mut splits, options)?;
     let none = plan.none();

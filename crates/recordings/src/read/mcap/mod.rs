@@ -39,7 +39,7 @@ use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
 use split::SplitFiles;
-use tautline_core::option::CLOCK;
+use tautline_core::option::{CLOCK, PLAN_END};
 use tautline_core::record::{ReadFault, RecordError};
 
 /// Program that wrote the positions of a file.
@@ -81,6 +81,9 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     if options.clock.is_some() && matches!(origin, Some(Origin::Run | Origin::Export)) {
         let problem = "it is a recording of tautline, which has one clock";
         return refuse(ContentKind::UnusedOption, problem, format!("omit {CLOCK}"));
+    }
+    if options.plan_end.is_some() && origin != Some(Origin::Foreign) {
+        return refuse(ContentKind::UnusedOption, "it has no plans of a planner", format!("omit {PLAN_END}"));
     }
     match origin {
         Some(Origin::Run) => return own::open_samples(source, options),

@@ -3,7 +3,7 @@
 //!
 //! A curve of a drone is flown from its start until the next one of that drone starts. The whole curve is a published
 //! plan ([`Published`]). The trajectory server of the first version holds the last point of a curve. That of the second
-//! version sends nothing after the end: the motion is unknown there.
+//! version sends nothing after the end: that the drone holds the last point is a default there.
 //!
 //! A B-spline has its degree in `order`, and its time 0 at the knot with this index. A MINCO trajectory of order 5 is
 //! the curve of least jerk through its points. A polynomial trajectory of order 5 has six coefficients of each piece,
@@ -26,7 +26,7 @@ use super::outline::Outline;
 use super::split::SplitFiles;
 use crate::mcap::topic::{CDR, DeclaredTopic, Part as FilePart, decode};
 use tautline_core::fact::{self, Fact, FactKind};
-use tautline_core::option::{CLOCK, DUPLICATES, FRAME, ORIGIN, SORT, TOPIC};
+use tautline_core::option::{CLOCK, DUPLICATES, FRAME, ORIGIN, PLAN_END, SORT, TOPIC};
 use tautline_core::text::counted;
 use tautline_core::track::{Clock, Item, Metadata, Plan as Published, PlanEnd};
 
@@ -113,7 +113,8 @@ pub(super) fn open(
             counted(repeated, "curve is", "curves are")
         ));
     }
-    let vehicles = vehicles(&drones, epoch_ns, options.metres(), &mut notes)?;
+    let end = options.plan_end.unwrap_or(PlanEnd::Hold);
+    let vehicles = vehicles(&drones, end, epoch_ns, options.metres(), &mut notes)?;
     let clock = Clock { unit: "ns", epoch_ns, ..Clock::default() };
     let mut facts = vec![
         Fact::name(FactKind::Clock, fact::Source::Recorded, "times of start in messages"),
@@ -129,9 +130,13 @@ pub(super) fn open(
         }
         Fact::name(FactKind::PlanPublication, fact::Source::Default, "their starts")
     });
-    if drones.values().flat_map(BTreeMap::values).all(|plan| plan.is_held) {
-        facts.push(Fact::name(FactKind::PlanEnd, fact::Source::Convention, PlanEnd::Hold.name()));
-    }
+    let is_rule = drones.values().flat_map(BTreeMap::values).all(|plan| plan.is_held);
+    let source = match options.plan_end {
+        Some(_) => fact::Source::Declared,
+        None if is_rule => fact::Source::Convention,
+        None => fact::Source::Default,
+    };
+    facts.push(Fact::name(FactKind::PlanEnd, source, end.name()));
     let plans = published_plans(&drones, published, epoch_ns, options.metres())?;
     Ok(Some(Curves::with_plans(vehicles, Metadata { clock, facts, ..Metadata::in_seconds(notes) }, plans)))
 }
@@ -165,6 +170,7 @@ fn seconds_since(epoch_ns: i64, time_ns: i64) -> f64 {
 /// Returns the names and the pieces of all drones, and adds notes on the ends of curves.
 fn vehicles(
     drones: &BTreeMap<i32, BTreeMap<i64, Plan>>,
+    end: PlanEnd,
     epoch_ns: i64,
     scale: f64,
     notes: &mut Vec<String>,
@@ -172,7 +178,7 @@ fn vehicles(
     let seconds = |ns: i64| seconds_since(epoch_ns, ns);
     let ends_s = drones.values().flatten().map(|(start_ns, plan)| seconds(*start_ns) + plan.duration_s());
     let end_s = ends_s.fold(f64::NEG_INFINITY, f64::max);
-    let (mut held, mut unknown) = (0, 0);
+    let mut ended = 0;
     let mut vehicles = Vec::new();
     for (vehicle, (drone, plans)) in drones.iter().enumerate() {
         let mut items = Vec::new();
@@ -193,24 +199,25 @@ fn vehicles(
             }
             let (stop_s, until_s) = (start_s + plan.duration_s(), until_s.min(end_s));
             if stop_s < until_s {
-                held += u64::from(plan.is_held);
-                unknown += u64::from(!plan.is_held);
-            }
-            if plan.is_held && stop_s < until_s {
-                push(stop_s, until_s, vec![plan.last()])?;
+                ended += 1;
+                let [position, velocity] = plan.last();
+                match end {
+                    PlanEnd::Hold => push(stop_s, until_s, vec![position])?,
+                    PlanEnd::Continue => push(stop_s, until_s, vec![position, velocity])?,
+                    PlanEnd::Unknown => {}
+                }
             }
         }
         vehicles.push((drone.to_string(), items));
     }
-    if held > 0 {
-        let ends = counted(held, "curve ends", "curves end");
-        notes.push(format!(
-            "{ends} before the next one or the recording: the drone holds the last point, as EGO-Planner does"
-        ));
-    }
-    if unknown > 0 {
-        let ends = counted(unknown, "curve ends", "curves end");
-        notes.push(format!("{ends} before the next one or the recording: the motion after the end is not known"));
+    if ended > 0 {
+        let ends = counted(ended, "curve ends", "curves end");
+        let then = match end {
+            PlanEnd::Hold => "the drone holds the last point",
+            PlanEnd::Continue => "the drone flies on with its last velocity",
+            PlanEnd::Unknown => "the motion after the end is not known",
+        };
+        notes.push(format!("{ends} before the next one or the recording: {then} ({PLAN_END})"));
     }
     Ok(vehicles)
 }
@@ -221,7 +228,7 @@ struct Plan {
     start_ns: i64,
     /// Parts in order, at least one.
     parts: Vec<Part>,
-    /// Whether the drone holds the last point after the end.
+    /// Whether the drone holds the last point after the end by the rule of the planner.
     is_held: bool,
 }
 
@@ -230,9 +237,11 @@ impl Plan {
         self.parts.last().map_or(0.0, |part| part.1)
     }
 
-    fn last(&self) -> Vector3<f64> {
-        let Some((from_s, to_s, coefficients)) = self.parts.last() else { return Vector3::zeros() };
-        value(coefficients, to_s - from_s)
+    /// Returns position and velocity at the end.
+    fn last(&self) -> [Vector3<f64>; 2] {
+        let Some((from_s, to_s, coefficients)) = self.parts.last() else { return [Vector3::zeros(); 2] };
+        let powers: Vec<_> = (1..coefficients.len()).map(|k| coefficients[k] * k as f64).collect();
+        [&coefficients[..], &powers].map(|coefficients| value(coefficients, to_s - from_s))
     }
 
     /// Returns the drones and the curves of a message. A list of B-splines has elements without points for drones that

@@ -208,7 +208,7 @@ impl ConfiguredAudit<'_> {
         if clock.inferred && facts.iter().all(|fact| fact.kind != FactKind::TimeUnit) {
             facts.push(Fact::name(FactKind::TimeUnit, FactSource::Inferred, &clock.unit));
         }
-        let plans = request.judge_plans(recording.as_ref(), &settings, &outcome, &mut facts, monitor)?;
+        let plans = request.judge_plans(recording.as_ref(), &settings, &outcome, monitor)?;
         let notes = recording.notes().to_vec();
         request.check_count(&outcome, &settings)?;
         side_files.check(&settings, &outcome)?;

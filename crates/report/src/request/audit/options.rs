@@ -20,7 +20,6 @@ use tautline_audit::envelope::{Envelope, Limit, Quantity};
 use tautline_audit::recorded::{Interpolation, RecordedError, Settings, VehicleSettings};
 use tautline_audit::{Cylinder, WellClear};
 use tautline_core::option::{ELLIPSOID, IDS, LIMIT, MAX_ACCEL, MOTION, OFFSET, Opt, PLAN_DELAY, RADIUS, TUBE};
-use tautline_core::track::PlanEnd;
 use tautline_recordings::read::{ArrayAxis, ArrayLayout, Axes, Scale};
 
 /// Largest delay of a plan that may be given \[s\]: a century.
@@ -118,11 +117,6 @@ pub struct AuditOptions {
     #[cfg_attr(feature = "cli", arg(long = "tube", value_name = "METRES", requires = "plan"))]
     #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
     pub tube_m: Option<f64>,
-    /// Motion after the end of a planner's plan: hold the last point, continue with the last velocity, or unknown,
-    /// which is not judged [default: hold].
-    #[serde(deserialize_with = "parsed")]
-    #[cfg_attr(feature = "cli", arg(long, value_name = "END"))]
-    pub plan_end: Option<PlanEnd>,
     /// Start of the judged window [s].
     #[cfg_attr(feature = "cli", arg(long = "from", value_name = "SECONDS", allow_negative_numbers = true))]
     pub from_s: Option<f64>,
