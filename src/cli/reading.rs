@@ -7,12 +7,12 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PathBufValueParser, PossibleValue, TypedValueParser};
 
-#[cfg(feature = "viewer")]
 use tautline_core::track::PlanEnd;
 use tautline_recordings::read::{
     ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, MessageClock, ReadOptions, Scale,
     TimeUnit,
 };
+#[cfg(feature = "viewer")]
 use tautline_report::request::Failure;
 use tautline_report::request::audit::recording_in;
 use tautline_report::request::one_of;

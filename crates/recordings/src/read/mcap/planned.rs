@@ -251,9 +251,11 @@ impl Plan {
         match kind {
             CurveKind::BSpline => Ok(vec![Self::of_b_spline(decoded(encoding, bytes)?)?]),
             CurveKind::BSplines => {
-                let (_from, list): (i32, Vec<Bspline>) = decoded(encoding, bytes)?;
+                // The angles of an element and their interval follow its points.
+                let (_from, list): (i32, Vec<(Bspline, Vec<f64>, f64)>) = decoded(encoding, bytes)?;
+                let list = list.into_iter().map(|(spline, ..)| spline);
                 let is_published = |spline: &Bspline| !(spline.points.is_empty() && spline.knots.is_empty());
-                list.into_iter().filter(is_published).map(Self::of_b_spline).collect()
+                list.filter(is_published).map(Self::of_b_spline).collect()
             }
             CurveKind::Minco => Ok(vec![Self::of_minco(encoding, bytes)?]),
             CurveKind::Polynomials => Ok(vec![Self::of_polynomials(encoding, bytes)?]),
