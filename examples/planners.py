@@ -205,8 +205,8 @@ def idle(aside_m: float) -> list[Message]:
 
 def unchecked(aside_m: float) -> list[Message]:
     """Curves are published without a check. Two cross between two samples at 33 Hz, at 9 m/s each."""
-    first = [(-6.0 + 2.7 * k, 0.0, 1.0) for k in range(8)]
-    second = [(0.0, -6.135 + 2.7 * k + aside_m, 1.0) for k in range(8)]
+    first = [(-6.04 + 2.7 * k, 0.0, 1.0) for k in range(8)]
+    second = [(0.0, -6.175 + 2.7 * k + aside_m, 1.0) for k in range(8)]
     return [spline(0, 0.0, 0.3, first), spline(1, 0.0, 0.3, second)]
 
 

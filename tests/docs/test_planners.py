@@ -79,7 +79,10 @@ class Planners(unittest.TestCase):
             _, report = audited(name, *options)
             self.assertNotEqual(report["status"], "violation", name)
         # Positions at 33 Hz are farther apart than the limit.
-        first, second = ([(-6.0 + 2.7 * k, 0.0, 1.0) for k in range(8)], [(0.0, -6.135 + 2.7 * k, 1.0) for k in range(8)])
+        first = [(-6.04 + 2.7 * k, 0.0, 1.0) for k in range(8)]
+        second = [(0.0, -6.175 + 2.7 * k, 1.0) for k in range(8)]
+        curves = [planners.spline(drone, 0.0, 0.3, points) for drone, points in enumerate((first, second))]
+        self.assertEqual(planners.unchecked(0.0), curves)
         places = ([on_spline(points, 0.3, k / 33) for points in (first, second)] for k in range(int(1.5 * 33)))
         self.assertGreater(min(math.dist(*pair) for pair in places), DELTA_M["unchecked"])
 
