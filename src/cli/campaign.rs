@@ -173,13 +173,17 @@ pub(super) fn campaign(arguments: &CampaignArguments, load: &LoadLaw<'_>) -> Res
         CampaignCommand::Plan(plan) => {
             let request =
                 CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.spec.request(load)? };
+            let file = plan.out.join("manifest.json");
+            let was_planned = file.exists();
             let folder = request.plan()?;
             let manifest = folder.campaign().manifest();
             let console = Console { data_on_stdout: false, quiet: false };
             let shards = format!("0-{}", manifest.shards - 1);
             let words = ["campaign", "shard", &plan.out.display().to_string(), "--shard", &shards];
+            let place = if was_planned { "planned before in" } else { "wrote" };
             console.say(&format!(
-                "{} runs in {} shards, campaign {}\nfly them with: {}",
+                "{place} {}: {} runs in {} shards, campaign {}\nfly them with: {}",
+                file.display(),
                 manifest.runs,
                 manifest.shards,
                 manifest.campaign,

@@ -121,7 +121,7 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
         monitor.warn(&format!("note: {file} does not contain this assumption: {assumed}"));
     }
     let vehicles = counted(exported.vehicles as u64, "vehicle", "vehicles");
-    monitor.say(&format!("{file}: {} samples of {vehicles}", exported.samples));
+    monitor.say(&format!("wrote {file}: {} samples of {vehicles}", exported.samples));
     Ok(())
 }
 

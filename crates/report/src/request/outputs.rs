@@ -11,7 +11,7 @@ use tautline_core::option::{FORCE, OUT};
 use tautline_sim::sim::Ending;
 
 use super::{Failure, Monitor};
-use tautline_core::files::write_atomically;
+use tautline_core::files::{FileError, write_atomically};
 
 /// Name that stands for standard output.
 const STANDARD_OUTPUT: &str = "-";
@@ -58,25 +58,44 @@ pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = NamedPath<'a>
     let inputs: Vec<_> = scenario.is_file().then_some(("the scenario".to_owned(), scenario)).into_iter().collect();
     check(&inputs, &files)?;
     for (option, file) in files {
-        let shown = file.display();
-        if file.is_dir() {
-            let help = format!("give {option} a file in this directory");
-            return Err(Failure::input("files/is-directory", format!("{shown} is a directory"), help));
-        }
         if file.is_file() && !force {
             return Err(Failure::input(
                 "files/exists",
-                format!("{shown} exists"),
+                format!("{} exists", file.display()),
                 format!("overwrite it with {FORCE}, or write another file"),
             ));
         }
-        let is_new_or_plain = file.metadata().map_or(true, |there| there.is_file());
-        let folder = file.parent().unwrap_or(Path::new(""));
-        if is_new_or_plain && let Err(error) = try_to_write_in(folder) {
-            let message = format!("cannot write {shown}: {error}");
-            return Err(Failure::machine("files/cannot-write", message)
-                .with_help(format!("give {option} a file that can be written")));
+        check_writable(&option, file)?;
+    }
+    Ok(())
+}
+
+/// Rejects a file whose folder is missing, and one that cannot be written.
+///
+/// # Errors
+/// [`Failure`] that names the file.
+pub fn check_in_folder(option: &str, file: &Path) -> Result<(), Failure> {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            Err(FileError::new(file, io::ErrorKind::NotFound.into()).into())
         }
+        _ => check_writable(option, file),
+    }
+}
+
+/// Rejects a directory in the place of a file, and a file that cannot be written. Creates a missing folder of the file.
+fn check_writable(option: &str, file: &Path) -> Result<(), Failure> {
+    let shown = file.display();
+    if file.is_dir() {
+        let help = format!("give {option} a file in this directory");
+        return Err(Failure::input("files/is-directory", format!("{shown} is a directory"), help));
+    }
+    let is_new_or_plain = file.metadata().map_or(true, |there| there.is_file());
+    let folder = file.parent().unwrap_or(Path::new(""));
+    if is_new_or_plain && let Err(error) = try_to_write_in(folder) {
+        let message = format!("cannot write {shown}: {error}");
+        let help = format!("give {option} a file that can be written");
+        return Err(Failure::machine("files/cannot-write", message).with_help(help));
     }
     Ok(())
 }

@@ -167,7 +167,7 @@ pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn
         let Some(Shard { rows, flown }) = fly_shard(folder, shard, &batch, monitor)? else { return Ok(false) };
         monitor.say(&match flown {
             0 => format!("shard {shard}: {} flights were finished before", rows.len()),
-            flown => format!("shard {shard}: {flown} flights flown"),
+            flown => format!("shard {shard}: {flown} flights flown, wrote {}", folder.part_path(shard).display()),
         });
     }
     monitor.finish();

@@ -41,6 +41,7 @@ use tautline_audit::{MovingObstacle, Violation, are_decimals_apart};
 use tautline_core::fact::{Fact, FactKind, Source as FactSource};
 use tautline_core::files::write_atomically;
 use tautline_core::option::{OBSTACLES, OFFSET};
+use tautline_core::text::counted;
 use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::ReadError;
 
@@ -115,10 +116,10 @@ impl ConfiguredAudit<'_> {
         self.asked_by.as_deref()
     }
 
-    /// Refuses outputs of the request, and `more` of the caller, that would overwrite an input or each other.
+    /// Rejects outputs as [`AuditRequest::check_outputs`] does.
     ///
     /// # Errors
-    /// [`Failure`] that names both.
+    /// As [`AuditRequest::check_outputs`].
     pub fn check_outputs(&self, more: &[outputs::NamedPath<'_>]) -> Result<(), Failure> {
         self.request.check_outputs(more)
     }
@@ -281,18 +282,26 @@ impl ConfiguredAudit<'_> {
             let (replay, mut figures) = replays::of_recording(open, monitor, &settings, &outcome, report, instants)?;
             figures.extend(plan_figure);
             write_atomically(html, report.to_html(&replay, &figures, &request.command).as_bytes())?;
+            let mut written = html.display().to_string();
             if !request.formats.is_empty() {
                 let folder = figures_beside(html);
                 let names = figures::NAMES_OF_AUDIT.iter();
                 let names = names.flat_map(|name| FigureFormat::ALL.map(|of| format!("{name}.{}", of.name())));
-                write_files(&folder, &names.collect::<Vec<_>>(), &figure_files(&figures, &request.formats))?;
+                let files = figure_files(&figures, &request.formats);
+                write_files(&folder, &names.collect::<Vec<_>>(), &files)?;
+                let count = counted(files.len() as u64, "figure", "figures");
+                written += &format!(" and {count} in {}", folder.display());
             }
+            monitor.say(&format!("wrote {written}"));
         }
         if let Some((file, (path, _))) = request.proof.as_ref().zip(request.subject.only_file()) {
             let recording = &report.source.recording;
             let judged = (&settings, &outcome, report.is_decimal_tie);
             let refused = proof::write(file, path, recording, judged, &report.source.clock)?;
-            tell(monitor, refused.as_slice());
+            match refused {
+                Some(why) => tell(monitor, &[why]),
+                None => monitor.say(&format!("wrote {}", file.display())),
+            }
         }
         Ok(())
     }

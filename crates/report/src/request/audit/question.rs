@@ -68,10 +68,11 @@ impl<'a> AuditRequest<'a> {
         Ok(audit)
     }
 
-    /// Rejects outputs of the request and `more` outputs of the caller that would overwrite an input or each other.
+    /// Rejects outputs of the request and `more` outputs of the caller that would overwrite an input or each other, or
+    /// that cannot be written.
     ///
     /// # Errors
-    /// [`Failure`] that names both files.
+    /// [`Failure`] that names the file, and the one that it would overwrite.
     pub fn check_outputs(&self, more: &[outputs::NamedPath<'_>]) -> Result<(), Failure> {
         let Self { subject, options: AuditOptions { obstacles, fence, plan, .. }, html, proof, .. } = self;
         let settings = config::file_of(self);
@@ -83,7 +84,9 @@ impl<'a> AuditRequest<'a> {
         inputs.extend(plan.as_deref().map(|path| ("the plan".to_owned(), path)));
         let own = [(HTML, html), (PROOF, proof)];
         let own = own.into_iter().filter_map(|(option, path)| Some((option.to_string(), path.as_deref()?)));
-        outputs::check(&inputs, &more.iter().cloned().chain(own).collect::<Vec<_>>())
+        let outputs: Vec<_> = more.iter().cloned().chain(own).collect();
+        outputs::check(&inputs, &outputs)?;
+        outputs.iter().try_for_each(|(option, file)| outputs::check_in_folder(option, file))
     }
 
     /// Returns the settings with the limits and obstacles of the files and of the recording.
