@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::console::{self, Console};
 use super::json::JsonArgument;
-use super::{Exit, completions};
+use super::{Exit, completions, hints};
 use tautline_core::text::aligned;
 use tautline_recordings::mcap::McapRecording;
 use tautline_report::request::Failure;
@@ -54,8 +54,9 @@ pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
 fn of_recording(name: &str) -> Result<String, Failure> {
     let path = Path::new(name);
     if !path.exists() {
-        let help =
-            "`tautline list` shows the built-in scenarios; give a recording by its path, such as out/pentagon/run.mcap";
+        let help = hints::builtin_meant(name).unwrap_or_default()
+            + "`tautline list` shows the built-in scenarios; give a recording by its path, such as \
+               out/pentagon/run.mcap";
         return Err(Failure::input(
             "scenario/not-found",
             format!("no built-in scenario and no recording `{name}`"),

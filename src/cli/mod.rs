@@ -29,6 +29,7 @@ mod watch;
 
 use std::ffi::OsString;
 use std::fmt::{self, Formatter};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Once;
 
@@ -75,6 +76,12 @@ pub fn entry_with(arguments: &[OsString], load: &LoadLaw<'_>) -> u8 {
         console::help(&Arguments::command().render_help());
         return Exit::Good as u8;
     };
+    if let (Command::Audit(_), Some(file)) = (&command, hints::behind_json(&words))
+        && !Path::new(file).exists()
+    {
+        let message = format!("--json: `{file}` is read as a recording, and does not exist");
+        return console::show(&Failure::input("usage/json-file", message, hints::equals_sign_before(file))) as u8;
+    }
     #[cfg(all(feature = "viewer", target_os = "linux"))]
     if match &command {
         Command::Run(run) => run.draws(),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::console::Console;
-use super::{Exit, completions};
+use super::{Exit, completions, hints};
 use tautline_core::files::write_atomically;
 use tautline_report::request::{Failure, command_line};
 use tautline_sim::scenario::builtin;
@@ -66,7 +66,8 @@ fn flight(path: &Path) -> String {
 
 fn unknown(from: &str) -> Failure {
     let names: Vec<_> = builtin::all().iter().map(|builtin| builtin.name).collect();
-    let help = format!("give one of {}; copy a file of your own without tautline new", names.join(", "));
+    let meant = hints::builtin_meant(from).unwrap_or_default();
+    let help = format!("{meant}give one of {}; copy a file of your own without tautline new", names.join(", "));
     Failure::input("scenario/not-found", format!("--like: `{from}` is not a built-in scenario"), help)
 }
 

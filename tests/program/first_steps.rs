@@ -175,12 +175,25 @@ fn without_a_command_the_help_is_shown_and_wrong_words_have_tips() {
         (&["audit", "flight.csv", "--delta", "2m"], "a length is a number of metres without a unit, such as 2\n"),
         (&["audit", "flight.csv", "--delta", "500mm"], "a length is a number of metres without a unit, such as 0.5\n"),
         (&["--color", "never", "run", "--st", "law.kind=orca"], "'--set'"),
+        (&["audit", "flight.csv", "--delta", "1,5"], "such as 1.5\n"),
+        (&["audit", "flight.csv", "--radius", "10cm"], "a radius is a number of metres without a unit, such as 0.5\n"),
+        (&["audit", "flight.csv", "--max-gap", "1s"], "a time is a number of seconds without a unit, such as 1\n"),
+        (&["watch", "--delta", "1", "--accel", "fast"], "an acceleration is a number of m/s^2 without a unit"),
+        (&["audit", "flight.csv", "--to", "5"], "'--until'"),
+        (&["audit", "flight.csv", "--format", "csv"], "'--input-format'"),
+        (&["audit", "flight.csv", "-o", "page.html"], "write the page with --html FILE"),
+        (&["run", "--html", "page.html"], "report.html in the folder of --out"),
+        (&["campaign", "rn"], "'run'"),
+        (&["list", "pentagon"], "tautline list --show pentagon"),
+        (&["list", "--show", "pentagn"], "did you mean `pentagon`?"),
+        (&["new", "mine", "--like", "pentagn"], "did you mean `pentagon`?"),
+        (&["audit", "flight.csv", "--delta", "1", "--json", "out.json"], "--json=out.json"),
     ] {
         let wrong = ran(folder.path(), arguments);
         assert_eq!((wrong.exit, wrong.out.as_str()), (WRONG_INPUT, ""), "{arguments:?}");
         assert!(wrong.err.contains(tip), "{arguments:?}: {}", wrong.err);
     }
-    for arguments in [&["juggle"][..], &["campaign", "spec.toml"]] {
+    for arguments in [&["juggle"][..], &["campaign", "spec.toml"], &["list", "nothing"], &["run", "--brightness"]] {
         let far = ran(folder.path(), arguments);
         assert!(far.exit == WRONG_INPUT && !far.err.contains("tip"), "{}", far.err);
     }
@@ -210,8 +223,11 @@ fn a_missing_file_or_folder_is_named_with_a_remedy() {
         (&["--fence", "no.toml"], "files/cannot-read", "no.toml: cannot read the file", "check the path"),
         (&["--html", "two.csv/b.html"], "files/no-folder", "two.csv is not a folder", "create the folder"),
         (&["--html", "a/b.html"], "files/no-folder", "a/b.html: cannot write the file: a does", "create the folder"),
+        (&["--proof", "a/b.json"], "files/no-folder", "a/b.json: cannot write the file: a does", "create the folder"),
+        (&["--events", "a/b.csv"], "files/no-folder", "a/b.csv: cannot write the file: a does", "create the folder"),
     ] {
         let refused = ran(folder.path(), &[&audit[..], arguments].concat());
+        assert_eq!(refused.out, "", "refused before the audit");
         assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, code), "{}", refused.err);
         assert!(refused.err.contains(says) && refused.err.contains(remedy), "{}", refused.err);
     }
