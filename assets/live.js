@@ -227,12 +227,14 @@ const draw = frame => {
   near = frame.near ?? [65535, 65535];
   if (isOld) doubt(behind_s); else {
     const { t_s, status, text, last_brake: by, nominal_violation: ahead } = frame.state;
-    const left_s = by && by.at_s - t_s, when = left_s > 0 ? `by ${left_s.toFixed(1)} s` : "now";
+    const left_s = by && by.at_s - t_s;
+    // Rounded down: the moment is not later.
+    const when = left_s > 0 ? `within ${(Math.floor(10 * left_s) / 10).toFixed(1)} s` : "now";
     show(`${t_s.toFixed(2)} s: ${rest(text)}`, status, {
       violated: frame.violated ?? [],
       warning: [status !== "violation" && ahead && "on course to violate", frame.off_plan && "OFF PLAN"]
         .filter(Boolean).join(", "),
-      brake: status === "violation" || !by ? "" : `brake ${by.subjects.join("-")} ${when}`,
+      brake: status === "violation" || !by ? "" : `brake ${by.subjects.join(" and ")} ${when}`,
     });
   }
   list(frame);

@@ -105,7 +105,7 @@ fn the_page_of_a_watch_shows_its_states_and_its_result() {
     assert_eq!(page.evaluate("document.querySelector('#sound').getAttribute('aria-pressed')"), "true");
 
     page.wait_for(&level("warning"));
-    page.wait_for("/^brake a-b (by [0-9.]+ s|now)$/.test(document.querySelector('#brake').textContent)");
+    page.wait_for("/^brake a and b (within [0-9.]+ s|now)$/.test(document.querySelector('#brake').textContent)");
     page.wait_for(&begins("#word", "CLEAR, on course to violate"));
 
     page.wait_for(&level("violation"));

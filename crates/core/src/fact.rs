@@ -344,6 +344,14 @@ impl fmt::Display for Fact {
                 out,
                 "vehicles round off corners (the velocity of {subject} jumps by {value}; {ACCEL_WINDOW} judges them)"
             ),
+            FactKind::OneStream => out.write_str(match self.source {
+                Source::NotObservable => "two vehicles under one name would not be noticed",
+                _ => "each name is that of one vehicle",
+            }),
+            FactKind::VelocityAgreement => out.write_str(match self.source {
+                Source::NotObservable => "sent velocities are not compared with positions yet",
+                _ => "sent velocities agree with positions",
+            }),
             kind => {
                 out.write_str(kind.code())?;
                 if !subject.is_empty() {
@@ -391,6 +399,15 @@ impl Serialize for Fact {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn facts_of_a_watch_have_sentences_for_both_sources() {
+        for kind in [FactKind::OneStream, FactKind::VelocityAgreement] {
+            let [seen, unseen] = [Source::Observed, Source::NotObservable].map(|of| Fact::new(kind, of).to_string());
+            assert!(seen != unseen && unseen.contains(" not "), "{seen}; {unseen}");
+            assert!(![seen, unseen].contains(&kind.code().to_owned()));
+        }
+    }
 
     #[test]
     fn a_fact_is_an_object_of_codes_and_a_value_with_its_unit() {

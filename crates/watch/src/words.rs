@@ -56,7 +56,7 @@ fn on_one_line(text: &str) -> String {
 }
 
 fn joined(pair: Pair, monitor: &Monitor) -> String {
-    pair.map(|vehicle| name(monitor, vehicle)).join("-")
+    pair.map(|vehicle| name(monitor, vehicle)).join(" and ")
 }
 
 fn state(of: &Assessment, monitor: &Monitor) -> String {
@@ -185,7 +185,7 @@ fn reason(reason: Reason, monitor: &Monitor) -> String {
             at_least(least_m.max(0.0), 2),
             monitor.settings().delta_m
         ),
-        Reason::Violation(pair) => format!("{} is in a measured violation", joined(pair, monitor)),
+        Reason::Violation(pair) => format!("{} are in a measured violation", joined(pair, monitor)),
         Reason::Late([stamp_s, newest_s]) => format!(
             "its stamp {} is older than the newest position ({}), so it is ignored",
             seconds(stamp_s),
@@ -320,7 +320,7 @@ fn summary(of: &Summary, monitor: &Monitor) -> String {
         text.extend([format!("; heard again after a sign-off: {}", of.returned)]);
     }
     if let Some((distance_m, pair)) = &of.closest {
-        text.extend([format!("; closest {} {} m", pair.join("-"), at_least(*distance_m, 2))]);
+        text.extend([format!("; closest {} {} m", pair.join(" and "), at_least(*distance_m, 2))]);
     }
     if let Some(count) = of.compared {
         text.extend([format!("; positions compared with the plan: {count}")]);
@@ -352,10 +352,10 @@ mod tests {
         let text = Notice::new(Statement::State(&monitor.assess(0.0)), &monitor).text;
         let bounds = "if positions are within 0.05 m (default) and accelerations within 9.81 m/s^2 (default)";
         assert!(text.starts_with("0.00 s: CLEAR until 0.5") && text.contains(bounds), "{text}");
-        assert!(text.ends_with("; closest a-b\u{fffd} 4.00 m, at least 3.89 m"), "{text}");
+        assert!(text.ends_with("; closest a and b\u{fffd} 4.00 m, at least 3.89 m"), "{text}");
         for (reason, expected) in [
             (Reason::Stale(0, 1.5), "a not heard for 1.50 s"),
-            (Reason::Uncertain([0, 1], 0.999), "a-b\u{fffd} may be as near as 0.99 m (delta 1 m)"),
+            (Reason::Uncertain([0, 1], 0.999), "a and b\u{fffd} may be as near as 0.99 m (delta 1 m)"),
             (Reason::Fault(Fault::Conflict, Some(0)), "a has two positions at one time"),
             (Reason::Fault(Fault::Conflict, None), "a vehicle has two positions at one time in the last 1 s"),
         ] {

@@ -30,9 +30,9 @@ pub fn live_page() -> String {
                         span.band-icon #icon aria-hidden="true" { "?" }
                         div.band-text {
                             p #word role="alert" { "UNDECIDED" }
+                            p #brake {}
                             p #verdict { "the page is not connected" }
                         }
-                        p #brake {}
                         button type="button" #sound aria-pressed="false" { "Sound: off" }
                     }
                 }
@@ -85,5 +85,12 @@ mod tests {
         assert_eq!(page.matches("'sha256-").count() + page.matches("&#39;sha256-").count(), 2);
         assert!(page.contains("connect-src 'self'") || page.contains("connect-src &#39;self&#39;"));
         assert!(!page.contains("http://") && !page.contains("https://"));
+    }
+
+    #[test]
+    fn the_last_moment_to_brake_stands_above_the_long_sentence() {
+        let page = live_page();
+        let place = |id: &str| page.find(&format!("id=\"{id}\"")).expect("an element");
+        assert!(place("word") < place("brake") && place("brake") < place("verdict"));
     }
 }
