@@ -194,7 +194,7 @@ fn csv_latex_and_page_agree_with_json() {
             assert_eq!(cell(column).parse().ok(), law.pointer(key).and_then(Value::as_f64), "{column}");
         }
         assert_eq!(cell("reached_median_s"), "", "no flight reached the formation");
-        assert!(latex.contains(&format!("\n{name} & ")) && html.contains(&format!("<th scope=\"row\">{name}</th>")));
+        assert!(latex.contains(&format!("\n{name} & ")) && html.contains(&format!("data-label=\"Law\">{name}</th>")));
     }
 
     let tables: Vec<_> = latex.split("\\begin{tabular}").skip(1).collect();

@@ -330,6 +330,7 @@ pub fn answer<E: Experiment>(
     let has_command = scenario.external_law.is_none() && options.external_laws().is_empty();
     let repeats = if has_command { study.repeats(scenario) } else { Vec::new() };
     let repeated = match &repeats[..] {
+        [_, _, _, ..] if files.html.is_some() => Vec::new(),
         [_, _, _, ..] => vec![format!("{HTML} writes a page with the command that repeats each of these flights")],
         few => few.iter().map(|(what, command)| format!("{what}\n  {command}")).collect(),
     };

@@ -45,17 +45,17 @@ pub fn control(log: &FlightLog, title: &str) -> Figure {
     let y = match later_peak(&spans).filter(|&later| numbers().fold(0.0, f64::max) > SPIKE * later) {
         Some(later) => {
             let shown = numbers().map(|effort| effort.max(DECADES * later));
-            Axis::log("control effort |u| [m/s²], logarithmic", shown)
+            Axis::log("control effort |u| [m/s^2], logarithmic", shown)
         }
-        None => Axis::linear("control effort |u| [m/s²]", numbers().chain([0.0]), true),
+        None => Axis::linear("control effort |u| [m/s^2]", numbers().chain([0.0]), true),
     };
     let mut chart = Chart::new(spans.time_axis(), y);
     of_each(&mut chart, &spans, |span| &span.extremes.control_m_s2);
     if let Some([peak, time_s]) = peak.filter(|[peak, _]| *peak > sampled().fold(0.0, f64::max)) {
-        chart.marks.push(Mark::ring((time_s, peak), INK, Some(format!("peak of all steps {} m/s²", up_to(peak)))));
+        chart.marks.push(Mark::ring((time_s, peak), INK, Some(format!("peak of all steps {} m/s^2", up_to(peak)))));
     }
     let peak = peak.map_or(0.0, |[peak, _]| peak);
-    let description = format!("Control effort of {count} vehicles over time; at most {} m/s².", up_to(peak));
+    let description = format!("Control effort of {count} vehicles over time; at most {} m/s^2.", up_to(peak));
     chart.figure("control", title, &description)
 }
 
@@ -139,20 +139,20 @@ pub fn energy(log: &FlightLog, title: &str) -> Figure {
     let spans = Spans::of(log);
     let points: Vec<_> = spans.iter().filter_map(|span| Some((span.time_s, span.extremes.energy?))).collect();
     let initial = log.energy_initial();
-    let y = Axis::linear("energy E [m²/s²]", points.iter().map(|&(_, y)| y).chain(initial).chain([0.0]), true);
+    let y = Axis::linear("energy E [m^2/s^2]", points.iter().map(|&(_, y)| y).chain(initial).chain([0.0]), true);
     let largest = points.iter().map(|&(_, y)| y).fold(f64::NAN, f64::max);
     let mut chart = Chart::new(spans.time_axis(), y);
     chart.line(points, Stroke::solid(VEHICLES[0], 1.8), "E(t)");
     let mut comparison = String::new();
     if let Some(initial) = initial {
-        chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m²/s²"));
+        chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m^2/s^2"));
         let excess = largest / initial - 1.0;
         comparison = if initial == 0.0 && largest > 0.0 {
-            format!(" It starts at zero and rises to {largest:.4} m²/s².")
+            format!(" It starts at zero and rises to {largest:.4} m^2/s^2.")
         } else if excess > 0.0 {
-            format!(" It exceeds E(0), {initial:.4} m²/s², by a share of {excess:.1e}.")
+            format!(" It exceeds E(0), {initial:.4} m^2/s^2, by a share of {excess:.1e}.")
         } else {
-            format!(" It never exceeds E(0), {initial:.4} m²/s².")
+            format!(" It never exceeds E(0), {initial:.4} m^2/s^2.")
         };
     }
     chart.figure("energy", title, &format!("The law's energy over time.{comparison}"))

@@ -27,10 +27,10 @@ pub fn tension_curve(tension: &EdgeTension, title: &str) -> Figure {
         .collect();
 
     let x = Axis::linear("distance l [m]", [0.0, far], false);
-    let mut chart = Chart::new(x, Axis::linear("tension V [m²/s²]", [0.0, top], true));
+    let mut chart = Chart::new(x, Axis::linear("tension V [m^2/s^2]", [0.0, top], true));
     chart.line(points, Stroke::solid(VEHICLES[0], 1.8), "V(l)");
     chart.upright(delta_m, Stroke::solid(INK, 1.6), Some(format!("barrier δ = {delta_m} m")));
-    let minimum = format!("minimum at d = {rest_m:.4} m, Vmin = {:.4} m²/s²", tension.minimum());
+    let minimum = format!("minimum at d = {rest_m:.4} m, Vmin = {:.4} m^2/s^2", tension.minimum());
     let description = format!("Edge tension over distance: unbounded towards {delta_m} m; {minimum}.");
     chart.marks.push(Mark::ring((rest_m, 0.0), VEHICLES[1], Some(minimum)));
     chart.figure("tension", title, &description)

@@ -221,17 +221,17 @@ impl Display for Reason {
                         format!("it was kept for the last {} only; {} is required", seconds(value), seconds(limit))
                     }
                     UnmetCriterion::MaxEdgeErrorM => {
-                        format!("at the end the largest edge error is {} m (limit {limit} m)", metres(value))
+                        format!("at the end the largest edge error is {} m (limit {limit} m)", up_to(value))
                     }
                     UnmetCriterion::MaxPositionErrorM => format!(
                         "at the end every edge error is within its limit, but the shape, its attitude or its place \
                          differs: the largest position error is {} m (limit {limit} m)",
-                        metres(value)
+                        up_to(value)
                     ),
                     UnmetCriterion::Disagreement => format!(
                         "at the end the largest speed relative to the mean velocity, or to that of the reference, is \
                          {} m/s (limit {limit} m/s)",
-                        metres(value)
+                        up_to(value)
                     ),
                 };
                 write!(out, "The formation was not reached: {why}.")?;
@@ -313,7 +313,7 @@ impl Reason {
             Self::EnergyRose { .. } => "energy rose: it is proved never to grow".to_owned(),
             Self::EndedEarly { at_s, .. } => format!("the flight ended early at {}", seconds(*at_s)),
             Self::NotReached { criterion, value, at_rest, .. } => {
-                let number = value.map_or("-".to_owned(), metres);
+                let number = value.map_or("-".to_owned(), up_to);
                 let what = match criterion {
                     UnmetCriterion::EndedEarly | UnmetCriterion::Unknown => {
                         return Some("not reached: no state at the end is known".to_owned());
@@ -627,8 +627,8 @@ impl Report {
         });
         format!(
             "initial {}, final {} m^2/s^2{}",
-            or_dash(energy.initial),
-            or_dash(energy.at_end),
+            energy.initial.map_or("-".to_owned(), metres),
+            energy.at_end.map_or("-".to_owned(), metres),
             ratio.unwrap_or_default()
         )
     }
@@ -721,6 +721,7 @@ fn capital_label(failure: &str) -> String {
     label.to_uppercase() + detail
 }
 
+/// Formats a number, rounded up as [`up_to`] does.
 fn or_dash(number: Option<f64>) -> String {
-    number.map_or("-".to_owned(), metres)
+    number.map_or("-".to_owned(), up_to)
 }

@@ -143,9 +143,9 @@ impl Page {
                         p.kind { (self.kind) }
                         h1 { (self.title) }
                         @if !self.setup.is_empty() { p.setup { (self.setup) } }
-                        p.verdict { (self.badge) " " (self.verdict) }
+                        p.verdict { (self.badge) " " (with_code(&self.verdict)) }
                         @if !self.reasons.is_empty() {
-                            ul.reasons { @for reason in &self.reasons { li { (reason) } } }
+                            ul.reasons { @for reason in &self.reasons { li { (with_code(reason)) } } }
                         }
                     }
                     main {
@@ -156,7 +156,7 @@ impl Page {
                             section.warnings aria-label="Warnings" {
                                 h2 { "Warnings" }
                                 p { "The check before the first step found these limits of the result." }
-                                ul { @for (code, message) in &self.warnings { li { code { (code) } " " (message) } } }
+                                ul { @for (code, message) in &self.warnings { li { code { (code) } " " (with_code(message)) } } }
                             }
                         }
                         @for section in &self.sections { (section) }
@@ -166,8 +166,7 @@ impl Page {
                 }
             }
         };
-        // Texts for a terminal have ASCII units; a page has one notation with its figures.
-        in_order(&page.into_string()).replace("m^2/s^2", "m²/s²").replace("m/s^2", "m/s²")
+        in_order(&page.into_string())
     }
 }
 
@@ -212,7 +211,7 @@ pub fn section(heading: &str, about: &str, content: &[Markup]) -> Markup {
 /// Returns a list of sentences; empty without items.
 #[must_use]
 pub fn list(items: &[impl Render]) -> Markup {
-    html! { @if !items.is_empty() { ul { @for item in items { li { (item) } } } } }
+    html! { @if !items.is_empty() { ul { @for item in items { li { (with_code(item)) } } } } }
 }
 
 /// Returns figures side by side in rows; empty without figures.
@@ -228,6 +227,20 @@ pub fn pictures(pictures: &[Picture]) -> Markup {
     side_by_side(pictures.iter().map(|Picture { description, data_uri, file, is_light }| {
         (html! { a href=(file) { img.day[*is_light] src=(data_uri) alt=(description); } }, description.clone())
     }))
+}
+
+/// Returns text with a `code` element in the place of each word in backticks. Elements stay unchanged.
+fn with_code(text: &impl Render) -> Markup {
+    let html = text.render().into_string();
+    let parts: Vec<_> = html.split('`').collect();
+    if html.contains('<') || parts.len().is_multiple_of(2) {
+        return PreEscaped(html);
+    }
+    let part = |(k, part): (usize, &&str)| match k % 2 {
+        0 => (*part).to_owned(),
+        _ => format!("<code>{part}</code>"),
+    };
+    PreEscaped(parts.iter().enumerate().map(part).collect())
 }
 
 fn side_by_side(drawn: impl Iterator<Item = (Markup, String)>) -> Markup {
@@ -287,9 +300,9 @@ fn table<R: IntoIterator<Item: Render>>(
                 tbody { @for row in rows { tr {
                     @for (k, cell) in row.into_iter().enumerate() {
                         @if k == 0 {
-                            th scope="row" { (cell) }
+                            th scope="row" data-label=[columns.first()] { (with_code(&cell)) }
                         } @else {
-                            td class=[class(k)] data-label=[class(k).and_then(|_| columns.get(k))] { (cell) }
+                            td class=[class(k)] data-label=[columns.get(k)] { (with_code(&cell)) }
                         }
                     }
                 } } }
@@ -309,4 +322,25 @@ pub fn tinted(content: &Markup, tone: Tone, share: f64) -> Markup {
 #[must_use]
 pub fn noted(text: &str, note: &str) -> Markup {
     html! { (text) small { (note) } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{list, numbers, words};
+
+    #[test]
+    fn words_in_backticks_are_code_and_other_backticks_stay() {
+        let shown = |text: &str| list(&[text]).into_string();
+        assert_eq!(shown("column `i<d`, `x`"), "<ul><li>column <code>i&lt;d</code>, <code>x</code></li></ul>");
+        assert_eq!(shown("a`b"), "<ul><li>a`b</li></ul>");
+    }
+
+    #[test]
+    fn every_cell_has_the_heading_of_its_column() {
+        for table in [words("t", &["Fact", "Value"], [["a", "b"]]), numbers("t", &["Fact", "Value"], [["a", "1"]])] {
+            let html = table.into_string();
+            assert!(html.contains("<th scope=\"row\" data-label=\"Fact\">"), "{html}");
+            assert!(html.contains("data-label=\"Value\">"), "{html}");
+        }
+    }
 }
