@@ -168,7 +168,7 @@ pub(super) fn campaign(arguments: &CampaignArguments, load: &LoadLaw<'_>) -> Res
                 worst: run.answer.worst.into(),
                 ..run.spec.request(load)?
             };
-            run.answer.run(|monitor| study::campaign(&request, &*run.answer.pictures(), monitor))
+            run.answer.run(|monitor| study::campaign(&request, &*run.answer.pictures()?, monitor))
         }
         CampaignCommand::Plan(plan) => {
             let request =
@@ -205,18 +205,18 @@ pub(super) fn campaign(arguments: &CampaignArguments, load: &LoadLaw<'_>) -> Res
         }
         CampaignCommand::Merge(AnswerArguments { folder, answer }) => {
             let folder = folder.open(load)?;
-            answer.run(|monitor| study::merge(&folder, answer.worst.into(), &*answer.pictures(), monitor))
+            answer.run(|monitor| study::merge(&folder, answer.worst.into(), &*answer.pictures()?, monitor))
         }
         CampaignCommand::Report(AnswerArguments { folder, answer }) => {
             let folder = folder.open(load)?;
-            answer.run(|monitor| study::report(&folder, answer.worst.into(), &*answer.pictures(), monitor))
+            answer.run(|monitor| study::report(&folder, answer.worst.into(), &*answer.pictures()?, monitor))
         }
         CampaignCommand::Replay(replay) => {
             let request =
                 ReplayRequest { run: replay.run, law: replay.law.clone(), bad: replay.bad, out: replay.out.clone() };
             let folder = replay.folder.open(load)?;
             let monitor = Terminal::new(Console { data_on_stdout: false, quiet: false })?;
-            Ok(Exit::good_if(study::replay(&folder, &request, &*pictures("best", !replay.no_snapshots), &monitor)?))
+            Ok(Exit::good_if(study::replay(&folder, &request, &*pictures("best", !replay.no_snapshots)?, &monitor)?))
         }
     }
 }
@@ -245,7 +245,7 @@ impl FolderArguments {
 }
 
 impl AnswerOptions {
-    fn pictures(&self) -> Box<dyn Pictures> {
+    fn pictures(&self) -> Result<Box<dyn Pictures>, Failure> {
         pictures("best", !self.no_snapshots)
     }
 

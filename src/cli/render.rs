@@ -11,6 +11,7 @@ use super::console::{Console, Terminal};
 use super::reading::ReadArguments;
 use super::{Exit, completions, drawing};
 use tautline_core::files::{write_atomically, write_atomically_with};
+use tautline_core::option::{self, FILM_FPS};
 use tautline_core::swarm::Pair;
 use tautline_render::{
     CameraSpec, Colouring, Extent, Film, FilmFormat, Layers, Picture, RenderError, Renderer, Scene, Theme, Timeline,
@@ -132,6 +133,14 @@ struct Sheet {
     size_px: [u32; 2],
 }
 
+/// Adds the option for the rate of a film to a failure that concerns the frame rate of the recording.
+fn about_film_rate(failure: Failure) -> Failure {
+    match failure.help().filter(|help| help.contains(&option::FPS.to_string())) {
+        Some(help) => failure.clone().with_help(format!("{help}; {FILM_FPS} sets the rate of a film")),
+        None => failure,
+    }
+}
+
 pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: false, quiet: arguments.quiet };
     let terminal = Terminal::that_abandons(console, "interrupted: nothing was written; give the command again")?;
@@ -149,7 +158,9 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let reading = arguments.reading.options();
     let recording = arguments.reading.only("drawn")?;
     let paths: Vec<&Path> = std::iter::once(recording).chain(arguments.beside.as_deref()).collect();
-    let read = |path: &&Path| drawing::flight(&recording_in(path), &reading, arguments.delta, console);
+    let read = |path: &&Path| {
+        drawing::flight(&recording_in(path), &reading, arguments.delta, console).map_err(about_film_rate)
+    };
     let flights = paths.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     let timeline = &flights[0];
     let default_folder = || match recording.parent() {

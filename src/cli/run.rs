@@ -40,16 +40,21 @@ pub(super) fn figure_formats(names: &[String]) -> Vec<Format> {
     Format::ALL.into_iter().filter(|of| names.iter().any(|name| name == of.name())).collect()
 }
 
-/// Returns the renderer of pictures on an adapter. A build without the viewer draws nothing.
+/// Returns the renderer of pictures on an adapter. Refuses an adapter that is named and missing. A build without the
+/// viewer draws nothing.
 #[cfg(feature = "viewer")]
-pub(super) fn pictures(adapter: &str, takes_snapshots: bool) -> Box<dyn Pictures> {
-    Box::new(tautline_render::RunPictures { adapter: adapter.to_owned(), takes_snapshots })
+pub(super) fn pictures(adapter: &str, takes_snapshots: bool) -> Result<Box<dyn Pictures>, Failure> {
+    if takes_snapshots {
+        tautline_render::AdapterChoice::from(adapter).check()?;
+    }
+    Ok(Box::new(tautline_render::RunPictures { adapter: adapter.to_owned(), takes_snapshots }))
 }
 
 /// Returns the renderer of pictures on an adapter. A build without the viewer draws nothing.
 #[cfg(not(feature = "viewer"))]
-pub(super) fn pictures(_adapter: &str, _takes_snapshots: bool) -> Box<dyn Pictures> {
-    Box::new(())
+#[expect(clippy::unnecessary_wraps, reason = "a build with the viewer refuses missing adapters")]
+pub(super) fn pictures(_adapter: &str, _takes_snapshots: bool) -> Result<Box<dyn Pictures>, Failure> {
+    Ok(Box::new(()))
 }
 
 /// Arguments of `tautline run`.
@@ -158,7 +163,7 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
         verbose: arguments.verbose,
         ..RunRequest::new(&scenario, repeat(&words))
     };
-    let pictures = pictures(&arguments.adapter, !arguments.no_snapshots);
+    let pictures = pictures(&arguments.adapter, !arguments.no_snapshots)?;
     let left = run_into(&request, &*pictures, terminal)?;
     if opens {
         terminal.open_page(&left.page);

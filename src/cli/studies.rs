@@ -68,7 +68,7 @@ impl StudyArguments {
         let monitor = Terminal::new(Console { data_on_stdout: files.are_piped(), quiet: self.quiet })?;
         let threads = self.threads.map(usize::from);
         let request = StudyRequest { scenario: self.what.request()?, options, files, threads };
-        let study = answer(&request, &*pictures(&self.adapter, true), &monitor)?;
+        let study = answer(&request, &*pictures(&self.adapter, true)?, &monitor)?;
         if let (true, Some(page)) = (self.open && study.is_some(), &self.html) {
             monitor.open_page(page);
         }

@@ -76,14 +76,28 @@ fn a_run_writes_pictures_and_shows_them_on_its_page() {
 }
 
 #[test]
-fn a_run_without_an_adapter_flies_with_a_warning() {
+fn a_run_refuses_an_adapter_that_does_not_exist_unless_it_takes_no_pictures() {
     let folder = tempfile::tempdir().expect("a folder");
-    let set = ["--set", "time.duration_s=1"];
-    let run = [&["run", "pentagon", "--out", "out", "--adapter", "no such adapter"], &set[..]].concat();
+    let run = ["run", "pentagon", "--out", "out", "--adapter", "no such adapter", "--set", "time.duration_s=1"];
     let Ran { exit, err, .. } = ran(folder.path(), &run);
+    assert_eq!(exit, Some(2), "{err}");
+    assert!(err.contains("there is no `no such adapter` adapter; there are: "), "{err}");
+    assert!(!folder.path().join("out").exists(), "nothing was flown");
+    let Ran { exit, err, .. } = ran(folder.path(), &[&run[..], &["--no-snapshots"]].concat());
     assert_eq!(exit, Some(1), "{err}");
-    assert!(err.contains("no pictures were taken: there is no `no such adapter` adapter"), "{err}");
-    assert!(folder.path().join("out/report.html").exists() && !folder.path().join("out/snapshots").exists());
+    assert!(folder.path().join("out/report.html").exists(), "{err}");
+}
+
+#[test]
+fn the_rate_of_a_recording_is_not_that_of_a_film() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("two.csv"), "t_s,id,x,y,z\n0,a,0,0,0\n0,b,9,0,0\n1,a,0,1,0\n1,b,9,1,0\n")
+        .expect("written");
+    let film = ["render", "two.csv", "--film", "film.gif", "--size", "64x48"];
+    let refused = ran(folder.path(), &[&film[..], &["--fps", "30"]].concat());
+    assert!(refused.exit == Some(2) && refused.err.contains("--film-fps sets the rate of a film"), "{}", refused.err);
+    let other = ran(folder.path(), &["render", "none.csv", "--fps", "30"]);
+    assert!(other.exit == Some(2) && !other.err.contains("--film-fps"), "{}", other.err);
 }
 
 #[test]

@@ -34,6 +34,19 @@ impl From<&str> for AdapterChoice {
     }
 }
 
+impl AdapterChoice {
+    /// Checks that an adapter of this name or type exists. The other choices need none.
+    ///
+    /// # Errors
+    /// [`RenderError::NoSuchAdapter`] with the names that exist, or [`RenderError::NoAdapter`] if the machine has none.
+    pub fn check(&self) -> Result<(), RenderError> {
+        match self {
+            Self::Best | Self::None => Ok(()),
+            Self::Hardware | Self::Software | Self::Named(_) => pick(&instance(None), self, None).map(drop),
+        }
+    }
+}
+
 /// Graphics APIs. OpenGL is excluded: its shaders cannot set the sample mask that balls need.
 const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 /// Device types, best first.
