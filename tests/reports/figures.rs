@@ -225,7 +225,7 @@ fn a_peak_of_the_start_gives_control_a_logarithmic_axis() {
         });
         Drawing::of(&figures::control(&log, "Control")).words().concat()
     };
-    assert!(label(100.0).contains("control effort |u| [m/s²], logarithmic"), "{}", label(100.0));
+    assert!(label(100.0).contains("control effort |u| [m/s^2], logarithmic"), "{}", label(100.0));
     assert!(!label(2.0).contains("logarithmic"), "{}", label(2.0));
 }
 
@@ -286,8 +286,8 @@ fn every_axis_names_its_unit() {
     for (name, labels) in [
         ("paths", ["x [m]", "y [m]"]),
         ("distances", ["time [s]", "distance [m]"]),
-        ("control", ["time [s]", "control effort |u| [m/s²]"]),
-        ("energy", ["time [s]", "energy E [m²/s²]"]),
+        ("control", ["time [s]", "control effort |u| [m/s^2]"]),
+        ("energy", ["time [s]", "energy E [m^2/s^2]"]),
         ("shape-error", ["time [s]", "largest edge error [m]"]),
         ("disagreement", ["time [s]", "velocity disagreement [m/s]"]),
     ] {

@@ -194,8 +194,8 @@ fn caption(group: &Group) -> String {
 
 /// Suffixes of names of numbers, with their units.
 const UNITS: [(&str, &str); 7] = [
-    ("_m2_s2", "m²/s²"),
-    ("_m_s2", "m/s²"),
+    ("_m2_s2", "m^2/s^2"),
+    ("_m_s2", "m/s^2"),
     ("_m_s", "m/s"),
     ("_per_s", "1/s"),
     ("_hz", "Hz"),
@@ -239,7 +239,7 @@ fn convergence(refinements: &[Refinement]) -> Markup {
     };
     page::numbers(
         "Largest position error of Rapier in the pentagon flight, by step",
-        &["Step [s]", "Position error [m]", "Order", "Energy excess [m²/s²]"],
+        &["Step [s]", "Position error [m]", "Order", "Energy excess [m^2/s^2]"],
         refinements.iter().map(row),
     )
 }
@@ -265,7 +265,7 @@ mod tests {
     fn names_of_numbers_become_words_with_units() {
         let list =
             "energy_initial_m2_s2 3.5, min_m 2.46, min_at_s 2.1, vehicle_1_x_at_10_s_m -1.0, off by 2 m, law_m x";
-        let words = "energy initial 3.5 m²/s², smallest separation 2.46 m, smallest separation at 2.1 s, \
+        let words = "energy initial 3.5 m^2/s^2, smallest separation 2.46 m, smallest separation at 2.1 s, \
                      vehicle 1 x at 10 s -1.0 m, off by 2 m, law_m x";
         assert_eq!(readable(list), words);
     }
