@@ -3,8 +3,8 @@
 // (assets/replay.js), whose data this script makes (crates/report/src/replay/data.rs).
 "use strict";
 (() => {
-// Instants that are drawn, and the time between two [s].
-const INSTANTS = 200, PERIOD_S = 0.1;
+// Instants that are drawn, the usual time between two [s], and the least one.
+const INSTANTS = 200, PERIOD_S = 0.1, LEAST_S = 1e-3;
 // Corners of a box. ROOM is the half size of the box of the view over the extent of the vehicles and their trails.
 const CORNERS = 8, ROOM = 0.65;
 // Delay from which the shown state is not known [s], and largest relative rate of the clocks of server and browser.
@@ -24,11 +24,14 @@ let names = [];
 let delta = 1, radius = 0.1;
 /** Middle and half sizes of the drawn box [m]. @type {number[][] | null} */
 let box = null;
-/** Places of the last instants, the oldest first. @type {(number[] | null)[][]} */
+/** Last instants, the oldest first: their times [s], and places and speeds of the vehicles.
+ * @type {{ t_s: number, present: (number[] | null)[] }[]} */
 let past = [];
 let waits = 500;
 /** Places and closest pair that are drawn. */
-let drawn = [0], near = [65535, 65535];
+let drawn = [0], speeds = [0], near = [65535, 65535];
+/** Time since the instant that was drawn before [s]. */
+let long_s = PERIOD_S;
 /** Time of the last frame on the clocks of the browser and the server, and smallest difference of both [s].
  * @type {{ arrival_s: number, sent_s: number, least_s: number } | null} */
 let last = null;
@@ -50,6 +53,9 @@ const packed = numbers => {
 const placed = places => places.flatMap(at =>
   at ? [...[0, 1, 2].map(axis => at[axis] - (box?.[0][axis] ?? 0)), at[3] ? 1 : 0] : [0, 0, 0, 0]);
 
+/** Returns the speed of each vehicle [m/s], NaN if it is not known. @param {any[]} places @returns {number[]} */
+const speedsOf = places => places.map(at => at?.[4] ?? NaN);
+
 /**
  * Returns instants in which the vehicles are at the corners of the box. The camera fits all instants, and thus the box.
  * @param {number[]} half
@@ -66,7 +72,7 @@ const controls = () => [...root.querySelectorAll(".replay-buttons :is(select, in
 /** Starts the view with a box around the last positions and their trails. Keeps the choices of the old view. */
 const restart = () => {
   const ends = [0, 1, 2].map(() => [Infinity, -Infinity]);
-  for (const at of past.flat()) if (at) ends.forEach((end, axis) => {
+  for (const at of past.flatMap(instant => instant.present)) if (at) ends.forEach((end, axis) => {
     end[0] = Math.min(end[0], at[axis]);
     end[1] = Math.max(end[1], at[axis]);
   });
@@ -76,14 +82,18 @@ const restart = () => {
   box = [middle, half];
   const reach = Math.max(half[0], half[1]), square = 10 ** Math.round(Math.log10(reach / 5));
   const most = Math.ceil(reach / square) * square, low = Math.min(0, ends[2][0]) - middle[2];
-  const times = Float64Array.from({ length: INSTANTS }, (_, k) => (k + 1 - INSTANTS) * PERIOD_S);
+  const kept = past.slice(CORNERS - INSTANTS), newest_s = kept.at(-1)?.t_s ?? 0;
+  const oldest_s = (kept[0]?.t_s ?? 0) - newest_s, before = INSTANTS - kept.length;
+  const times = Float64Array.from({ length: INSTANTS }, (_, k) =>
+    k < before ? oldest_s + (k - before) * PERIOD_S : kept[k - before].t_s - newest_s);
   const first = Float64Array.of(times[0]), nobody = Uint16Array.of(65535, 65535);
-  const trails = past.slice(CORNERS - INSTANTS).map(placed), absent = placed(names.map(() => null));
+  const trails = kept.map(instant => placed(instant.present)), absent = placed(names.map(() => null));
   const free = Array.from({ length: INSTANTS - CORNERS - trails.length }, () => absent);
   root.querySelector("script").textContent = JSON.stringify({
     ...empty, vehicles: names, radius_m: names.map(() => radius), shell_m: [delta / 2, delta / 2, delta / 2],
     delta_m: delta, clearance_m: delta, times_s: packed(times), points: names.length,
-    starts: packed(new Int32Array(3 * names.length)), places: [...corners(half), ...free, ...trails], cell_m: 1,
+    starts: packed(new Int32Array(3 * names.length)), places: [...corners(half), ...free, ...trails],
+    speeds: kept.map(instant => speedsOf(instant.present)), cell_m: 1,
     origin_m: middle, middle_m: middle, half_m: half, swarm_m: half, square_m: square,
     ground: [[-most, -most, low], [most, most, low]], near_s: packed(first), near_who: packed(nobody),
   });
@@ -100,6 +110,8 @@ const restart = () => {
     [control.value, control.checked] = [old[k].value, old[k].checked];
     control.onchange();
   });
+  // The view holds the newest instant.
+  long_s = LEAST_S;
   // A live view has no other time to play or to choose.
   for (const one of root.querySelectorAll(".replay-play, .replay-track, .replay-clock, [aria-label=Speed]"))
     one.style.display = "none";
@@ -160,7 +172,8 @@ const show = (said, status, { violated = [], warning = "", brake: by = "", name 
   brake.textContent = by;
   document.title = `${icon.textContent} ${by || text} - tautline watch`;
   // Without a box the view has other vehicles than the roster. The sentence is in the band: it would cover the view.
-  if (box) root.player?.push(drawn, [-INSTANTS * PERIOD_S, next === "violation", text, violated, null], near);
+  if (box) root.player?.push(drawn, speeds, long_s, [-Infinity, next === "violation", text, violated, null], near);
+  long_s = LEAST_S;
 };
 /** Shows that the state is old. @param {number} behind_s */
 const doubt = behind_s => show(`the page is ${behind_s.toFixed(1)} s behind`, "undecided");
@@ -204,7 +217,8 @@ const list = frame => {
   }));
   // The roster of the first vehicle names delta.
   fill(facts, [...names.length ? [`delta ${delta} m`] : [], ...frame.facts ?? []]);
-  const { heard, stale, signed_off: off } = frame.state, shown = drawn.filter((_, k) => k % 4 === 3 && drawn[k]).length;
+  const { heard, stale, signed_off: off } = frame.state, isDrawn = root.dataset.state === "ready";
+  const shown = isDrawn ? drawn.filter((_, k) => k % 4 === 3 && drawn[k]).length : 0;
   const named = (/** @type {string} */ what, /** @type {string[]} */ of) =>
     of.length ? ` ${what}: ${of.join(", ")}.` : "";
   absent.textContent = `${shown} of ${heard} vehicles are drawn.`
@@ -218,12 +232,15 @@ const draw = frame => {
   const behind_s = delay(frame.sent_s), isOld = behind_s > MOST_BEHIND_S;
   const places = frame.places.slice(0, names.length);
   const present = places.map((/** @type {any} */ at) => at?.[3] ? at : null);
-  past = [...past, present].slice(-INSTANTS);
+  const now_s = frame.state.t_s, before_s = past.at(-1)?.t_s ?? now_s - PERIOD_S;
+  // A clock that goes back is that of another watch.
+  long_s = Math.max(now_s - before_s, LEAST_S);
+  past = [...past, { t_s: before_s + long_s, present }].slice(-INSTANTS);
   const [middle, half] = box ?? [[0, 0, 0], [-1, -1, -1]];
   const outside = present.some((/** @type {any} */ at) =>
     at && half.some((size, axis) => Math.abs(at[axis] - middle[axis]) > size));
   if (outside) restart();
-  drawn = placed(places);
+  [drawn, speeds] = [placed(places), speedsOf(places)];
   near = frame.near ?? [65535, 65535];
   if (isOld) doubt(behind_s); else {
     const { t_s, status, text, last_brake: by, nominal_violation: ahead } = frame.state;

@@ -25,8 +25,8 @@
  * @typedef {[number, boolean, string, number[], number | null]} Verdict
  */
 /**
- * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more. A live view has `places` for its last
- * instants in the form of `push`.
+ * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more. A live view has `places` and
+ * `speeds` for its last instants in the form of `push`.
  * @typedef {{limits: {named: number, trails: number[], drops: number, slots: number, links: number, colours: number},
  *   tangent: number, light: number[], vehicles: string[], radius_m: number[], shell_m: number[] | null,
  *   times_s: Packed, middle_m: number[], origin_m: number[], half_m: number[], swarm_m: number[], cell_m: number,
@@ -38,7 +38,7 @@
  *   clearance_m: number, rotors: {ends_m: number[][], rotor_m: number, body_m: number, arm_m: number} | null,
  *   turns: Packed, links: Packed, link_look: [number, number], tension: boolean,
  *   delta_m: number, lights: boolean, formations: {from_s: number, slots: Packed}[], axis_m: number,
- *   axes: number | null, reference: number | null, places?: number[][]}} Data
+ *   axes: number | null, reference: number | null, places?: number[][], speeds?: (number | null)[][]}} Data
  */
 /** @typedef {{vao: WebGLVertexArrayObject | null, count: number, buffer: WebGLBuffer | null}} Mesh */
 /** @typedef {{made: WebGLProgram, at: Object<string, WebGLUniformLocation>}} Program */
@@ -154,6 +154,10 @@ const play = (root, data) => {
     }
     data.places?.forEach((at, k, all) => path.set(at, (times.length - all.length + k) * wide * 4));
   }
+  // Speeds that the data states [m/s], NaN where one is not known.
+  const stated = data.speeds ? new Float32Array(times.length * count).fill(NaN) : null;
+  data.speeds?.forEach((speeds, k, all) =>
+    stated?.set(speeds.map(speed => speed ?? NaN), (times.length - all.length + k) * count));
 
   // Attitudes as quaternions x, y, z, w, in a texture like that of positions.
   const rotors = data.rotors, turned = new Float32Array(rotors ? times.length * count * 4 : 4);
@@ -174,7 +178,8 @@ const play = (root, data) => {
     class: "replay-view", tabindex: "0", role: "img",
     "aria-label": "Flight in 3-D. Space plays, arrows step, W, A, S and D turn, H lists all keys." }));
   const gl = /** @type {WebGL2RenderingContext} */ (canvas.getContext("webgl2", { alpha: false, antialias: true }));
-  if (!gl) throw new Error("This browser does not draw WebGL 2: a still picture replaces the replay.");
+  if (!gl) throw new Error("This browser does not draw WebGL 2: "
+    + (root.querySelector(".replay-still") ? "a still picture replaces the replay." : "there is no view."));
   const names = /** @type {HTMLCanvasElement} */ (make("canvas", { class: "replay-names", "aria-hidden": "true" }));
   const state = make("p", { class: "replay-state" }), chosen = make("p", { class: "replay-picked" });
   const scale = make("p", { class: "replay-scale" });
@@ -329,6 +334,21 @@ const play = (root, data) => {
     const vehicle = k % count, from = (Math.floor(k / count) * wide + vehicle) * 4;
     if (path[from + 3]) cloud.push([path[from], path[from + 1], path[from + 2], Math.max(shell, outer[vehicle])]);
   }
+  // Slots, at most as often as SAMPLES allow.
+  if (data.axes !== null && !off.has("slots")) for (const [k, { from_s, slots }] of data.formations.entries()) {
+    const all = new Float32Array(bytes(slots)), low = Math.max(upTo(times, from_s) - 1, 0);
+    const high = upTo(times, data.formations[k + 1]?.from_s ?? Infinity);
+    const by = Math.max(1, Math.ceil((high - low) * all.length / 3 / SAMPLES));
+    for (let row = low; row < high; row += by) {
+      const [middle, ...ends] = [0, 1, 2, 3].map(part => (row * wide + /** @type {number} */ (data.axes) + part) * 4)
+        .map(from => path.subarray(from, from + 4));
+      for (let slot = 0; middle[3] && slot < all.length; slot += 3) {
+        const at = [0, 1, 2].map(axis => ends.reduce((sum, end, part) =>
+          sum + (end[axis] - middle[axis]) * all[slot + part] / data.axis_m, middle[axis]));
+        cloud.push([...at, least_m]);
+      }
+    }
+  }
   const bounds = [0, 1, 2].map(axis => cloud.reduce(([low, high], at) => [Math.min(low, at[axis]),
     Math.max(high, at[axis])], [Infinity, -Infinity]));
   const from = data.viewpoint;
@@ -340,6 +360,9 @@ const play = (root, data) => {
   const fit = () => {
     follow.value = "";
     const { right, up, back } = axes(), wide = TANGENT * aspect() * 0.94;
+    // Shares of the height above and below the middle; the caption covers the top.
+    const covered = shows.caption ? 2 * (state.offsetTop + state.offsetHeight) / (canvas.clientHeight || 1) : 0;
+    const [above, below] = [clamp(1 - covered, 0.5, 0.84), 0.84], tall = TANGENT * (above + below) / 2;
     target = bounds.map(([low, high]) => (low + high) / 2);
     for (let turns = 0; turns < 4; turns++) {
       const seen = cloud.map(at => {
@@ -349,7 +372,7 @@ const play = (root, data) => {
       distance = 0;
       for (const [x, y, z, r] of seen) {
         const ahead = parallel ? 0 : z;
-        distance = Math.max(distance, (Math.abs(x) + r) / wide + ahead, (Math.abs(y) + r) / TANGENT / 0.84 + ahead,
+        distance = Math.max(distance, (Math.abs(x) + r) / wide + ahead, (Math.abs(y) + r) / tall + ahead,
           1.01 * r + ahead);
       }
       const middle = [0, 1].map(axis => {
@@ -358,6 +381,7 @@ const play = (root, data) => {
       });
       target = target.map((x, k) => x + right[k] * middle[0] + up[k] * middle[1]);
     }
+    target = target.map((x, k) => x + up[k] * distance * TANGENT * (below - above) / 2);
     fitted = { yaw, pitch, distance, target };
   };
   /** Distance at which a camera that follows the swarm always shows all of it [m]. */
@@ -637,6 +661,7 @@ const play = (root, data) => {
   };
   /** Speed of each vehicle at an instant [m/s], of the interval behind it, or before the last one. */
   const speedsAt = (/** @type {number} */ row) => {
+    if (stated) return stated.subarray(row * count, (row + 1) * count);
     const [a, b] = row + 1 < times.length ? [row, row + 1] : [Math.max(row - 1, 0), row];
     return Float32Array.from(radius, (_, k) => {
       const [from, to] = [(a * wide + k) * 4, (b * wide + k) * 4], long = times[b] - times[a];
@@ -644,6 +669,7 @@ const play = (root, data) => {
         : Math.hypot(...[0, 1, 2].map(axis => path[to + axis] - path[from + axis])) / long;
     });
   };
+  const inWords = (/** @type {number} */ speed) => Number.isNaN(speed) ? "speed not known" : speed.toFixed(2) + " m/s";
   /** Colours vehicles and trails by what is chosen. */
   const recolour = () => {
     const kind = colouring.value, at = kind === "speed" ? speedsAt : clearances;
@@ -654,7 +680,7 @@ const play = (root, data) => {
     themed();
     if (!kind || lit) return;
     const numbers = new Float32Array(times.length * count);
-    for (let row = 0; row < times.length; row++) numbers.set(at(row), row * count);
+    for (let row = 0; row < times.length; row++) numbers.set(at(row).map(x => x || 0), row * count);
     const high = kind === "speed" ? numbers.reduce((most, x) => Math.max(most, x), 1e-9) : data.clearance_m;
     gl.deleteTexture(gl.getParameter((gl.activeTexture(gl.TEXTURE2), gl.TEXTURE_BINDING_2D)));
     texture(2, gl.R32F, count, times.length, gl.FLOAT, numbers);
@@ -948,7 +974,7 @@ const play = (root, data) => {
     state.hidden = !shows.caption;
     const there = picked !== null && place(picked)[3];
     write(chosen, picked === null ? "" : `vehicle ${data.vehicles[picked]} · `
-      + (there ? data.holds ? "present" : speedsAt(row)[picked].toFixed(2) + " m/s" : "absent"));
+      + (there ? data.holds ? "present" : inWords(speedsAt(row)[picked]) : "absent"));
     state.classList.toggle("replay-alarm", alarm);
     write(clock, time + " s");
     scrub.value = t;
@@ -978,6 +1004,11 @@ const play = (root, data) => {
   look(from.across === null ? 0 : 3 - from.across);
   // The camera follows lights, and a swarm that travels far.
   if (data.lights || data.follows) [follow.value, distance] = ["swarm", close()];
+  const violation = moments.find(moment => moment.kind === "violation");
+  if (root.dataset.opens === "violation" && violation) {
+    go(violation.at_s);
+    announce(violation);
+  }
   return {
     root, draw,
     /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */
@@ -995,11 +1026,16 @@ const play = (root, data) => {
       return { ...axes(), tangent: TANGENT, place };
     },
     /**
-     * Appends an instant to a live view and drops the oldest one: x, y, z [m] and 1 or 0 for each vehicle, the verdict
-     * and the closest pair.
-     * @param {number[]} places @param {Verdict} verdict @param {number[]} pair
+     * Appends an instant to a live view and drops the oldest one: x, y, z [m] and 1 or 0 for each vehicle, speeds [m/s]
+     * or NaN, the time since the last instant [s], the verdict and the closest pair. The newest instant keeps its time.
+     * @param {number[]} places @param {number[]} speeds @param {number} long_s @param {Verdict} verdict
+     * @param {number[]} pair
      */
-    push(places, verdict, pair) {
+    push(places, speeds, long_s, verdict, pair) {
+      times.copyWithin(0, 1);
+      times.forEach((time, row) => { times[row] = row + 1 < times.length ? time - long_s : last; });
+      stated?.copyWithin(0, count);
+      stated?.set(speeds, (times.length - 1) * count);
       path.copyWithin(0, 4 * wide);
       path.set(places, (times.length - 1) * wide * 4);
       times.forEach((time, row) => { path[((row + 1) * wide - 1) * 4] = time - first; });

@@ -32,7 +32,7 @@ fn text(value: &Value) -> &str {
 }
 
 #[test]
-fn the_script_passes_the_type_check() {
+fn the_scripts_pass_the_type_check() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let check = |file: &Path| {
         let compiler = root.join("target/typescript/node_modules/.bin/tsc");
@@ -46,14 +46,19 @@ fn the_script_passes_the_type_check() {
             });
         (output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned())
     };
-    let script = root.join("assets/replay.js");
-    let (is_right, said) = check(&script);
-    assert!(is_right, "{said}");
     let folder = tempfile::tempdir().expect("a folder");
     let wrong = folder.path().join("wrong.js");
-    let source = fs::read_to_string(&script).expect("a script");
-    fs::write(&wrong, source.replacen("const first = times[0]", "const first = `${times[0]}`", 1)).expect("written");
-    assert!(!check(&wrong).0, "a wrong type is detected");
+    for (name, right_part, wrong_part) in [
+        ("replay.js", "const first = times[0]", "const first = `${times[0]}`"),
+        ("live.js", "let waits = 500", "let waits = `500`"),
+    ] {
+        let script = root.join("assets").join(name);
+        let (is_right, said) = check(&script);
+        assert!(is_right, "{said}");
+        let source = fs::read_to_string(&script).expect("a script");
+        fs::write(&wrong, source.replacen(right_part, wrong_part, 1)).expect("written");
+        assert!(!check(&wrong).0, "a wrong type in {name} is detected");
+    }
 }
 
 #[test]

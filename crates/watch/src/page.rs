@@ -190,7 +190,9 @@ impl Page {
         }
         let places: Vec<Value> = (0..self.names)
             .map(|k| match monitor.newest(k).filter(|_| !monitor.has_signed_off(k)) {
-                Some((at, ..)) => json!([at.x, at.y, at.z, !monitor.is_stale(k)]),
+                Some((at, velocity, _)) => {
+                    json!([at.x, at.y, at.z, !monitor.is_stale(k), velocity.map(|velocity| velocity.norm())])
+                }
                 None => Value::Null,
             })
             .collect();
@@ -505,7 +507,7 @@ mod tests {
         assert_eq!(read()["vehicles"], serde_json::json!(["a", "b"]));
         let frame = read();
         assert_eq!(frame["op"], "frame");
-        assert_eq!(frame["places"][1], serde_json::json!([0.5, 0.0, 0.0, true]));
+        assert_eq!(frame["places"][1], serde_json::json!([0.5, 0.0, 0.0, true, null]));
         assert_eq!(frame["off_plan"], false);
         assert!(
             frame["facts"].as_array().expect("a list").contains(&"position-error: 0.05 m (default)".into()),

@@ -54,6 +54,8 @@ fn without_comments(source: &str) -> String {
 pub enum Start {
     /// With the page.
     AtOnce,
+    /// With the page, and at the first violation.
+    AtViolation,
     /// On a click. Another replay of the page then stops drawing.
     OnDemand,
 }
@@ -68,9 +70,9 @@ pub fn replay(label: &str, replay: &Result<Replay, NoReplay>, start: Start) -> M
         Ok(replay) => replay,
         Err(why) => return html! { p { "No replay: " (why) "." } },
     };
-    let on_demand = start == Start::OnDemand;
+    let [on_demand, at_violation] = [Start::OnDemand, Start::AtViolation].map(|other| start == other);
     html! {
-        div.replay data-label=(label) data-start=[on_demand.then_some("later")] {
+        div.replay data-label=(label) data-start=[on_demand.then_some("later")] data-opens=[at_violation.then_some("violation")] {
             script type="application/json" { (PreEscaped(&replay.json)) }
             noscript { p { "The replay needs JavaScript, which is disabled. A still picture replaces it." } }
             div.replay-still { (PreEscaped(&replay.still.svg)) }

@@ -400,7 +400,7 @@ impl RecordedReport {
         let headline = self.headline();
         let rest = headline.strip_prefix(word).unwrap_or(&headline).trim_start_matches([':', ' ']).to_owned();
         let mut page = Page::new("Audit of a recording", self.source.recording.clone(), badge, rest);
-        page.replay = Some(page::replay(&self.source.recording, replay, Start::AtOnce));
+        page.replay = Some(page::replay(&self.source.recording, replay, Start::AtViolation));
         page.add(
             "Figures",
             "Distances over the recording; a bold line across a chart is the limit.",
