@@ -63,6 +63,8 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, words: &[Str
             } else if let Some(name) = option_meant(command, &argument, usage.get(ContextKind::SuggestedArg).is_some())
             {
                 usage.remove(ContextKind::Suggested);
+                // The usage is that of the option that clap suggests.
+                usage.remove(ContextKind::Usage);
                 usage.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{name}")));
             }
         }
