@@ -181,6 +181,16 @@ fn junit_events_and_page_are_written() {
     assert!(events.contains("\nviolation,alpha,bravo,0.41"), "{events}");
     let page = read("a.html");
     assert!(page.contains("VIOLATION") && page.contains("closest 1.000000 m") && page.contains("Closest approach"));
+    assert!(["wrote a.xml", "wrote a.csv", "wrote a.html"].iter().all(|line| ran.out.contains(line)), "{}", ran.out);
+    let figures = ["pass.csv", "--delta", "2", "--html", "b.html", "--figures", "svg", "--proof", "b.json"];
+    let drawn = audit(folder.path(), &figures);
+    assert!(
+        drawn.out.contains("\nwrote b.html and ") && drawn.out.contains(" figures in b-figures\n"),
+        "{}",
+        drawn.out
+    );
+    assert!(drawn.out.contains("\nwrote b.json"), "{}", drawn.out);
+    assert_eq!(audit(folder.path(), &[&figures[..], &["-q"]].concat()).out, "");
     let clear = audit(folder.path(), &[&["pass.csv", "--delta", "0.5"][..], &files].concat());
     assert_eq!(clear.exit, Some(0), "{clear:?}");
     assert!(read("a.xml").contains("failures=\"0\"") && !read("a.csv").contains("violation"));

@@ -40,7 +40,7 @@ fn a_recording_survives_every_format() {
     ] {
         let done = ran(folder.path(), &["export", from, "-o", to]);
         assert_eq!(done.exit, Some(0), "{from} to {to}: {}", said(&done));
-        assert!(said(&done).contains("4 samples of 2 vehicles"), "{}", said(&done));
+        assert!(said(&done).contains(&format!("wrote {to}: 4 samples of 2 vehicles")), "{}", said(&done));
     }
     let text = |name: &str| fs::read_to_string(folder.path().join(name)).expect("read");
     assert_eq!(text("4.csv"), text("5.csv"));

@@ -127,11 +127,18 @@ fn the_page_shows_a_vehicle_off_its_plan_with_slow_stamps() {
     std::fs::write(folder.path().join("plan.csv"), plan).expect("written");
     let arguments = ["--accel", "2", "--time", "stamps", "--plan", "plan.csv", "--tube", "0.5"];
     // Stamps run at half of the speed of the clock.
-    let poses = |_| vec![("A B", 0.0, 0.0, 0.0), ("b", 5.0, 0.0, 0.0)];
+    let poses = |t_s| vec![("A B", 0.0, 0.0, 0.0), ("b", 5.0 + 0.25 * t_s, 0.0, 0.25)];
     let mut watch = Watch::start(folder.path(), &arguments, 0.5, poses);
     watch.page.wait_for(&level("warning"));
     watch.page.wait_for(&begins("#word", "CLEAR, OFF PLAN"));
     watch.page.wait_for("document.querySelector('#pairs td').textContent === 'A B and b'");
+    for (vehicle, speed) in [("A B", "0.00"), ("b", "0.25")] {
+        watch.page.evaluate(
+            "document.querySelector('.replay-view').dispatchEvent(new KeyboardEvent('keydown',
+               { key: 'v', bubbles: true })); 0",
+        );
+        watch.page.wait_for(&begins(".replay-picked", &format!("vehicle {vehicle} \u{b7} {speed} m/s")));
+    }
     // After seconds the page is not behind, although its stamps are.
     watch.page.wait_for("/^[3-9]/.test(document.querySelector('#verdict').textContent)");
     assert_eq!(watch.page.evaluate(&level("warning")), true);

@@ -333,6 +333,21 @@ fn the_state_shows_only_findings_up_to_the_current_time() {
     assert_eq!(found, ["no violation so far", "violation: b: speed 19.750 m/s (limit 5.000 m/s)"]);
 }
 
+#[test]
+fn an_audit_opens_at_its_violation_and_a_clear_one_at_the_start() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = "t_s,id,x,y,z\n0,a,0,0,0\n0,b,8,1,0\n8,a,8,0,0\n8,b,0,1,0\n";
+    for (delta, state, time) in [("2", "violation: a and b come to ", "4.0"), ("0.5", "no violation so far", "0.0")] {
+        let page = audited(folder.path(), table, &["--delta", delta]);
+        let script = "root.player.draw(); return ['state', 'clock', 'said'].map(name =>
+             doc.querySelector('.replay-' + name).textContent);";
+        let (found, said) = steer(folder.path(), &page, DESKTOP, script);
+        assert!(said.is_empty() && text(&found[0]).starts_with(state), "{found} {said:?}");
+        assert!(text(&found[1]).starts_with(time), "{found}");
+        assert_eq!(text(&found[2]).is_empty(), delta == "0.5", "{found}");
+    }
+}
+
 /// The audit of a run uses the separations that the run recorded between samples.
 #[test]
 fn the_smallest_separation_of_an_audited_run_matches_the_verdict() {

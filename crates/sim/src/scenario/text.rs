@@ -257,7 +257,8 @@ impl Override {
                 let base = parsed.value.start;
                 let span = error.span().map_or(parsed.value.clone(), |span| base + span.start..base + span.end);
                 let problem = format!("the value is not TOML: {}", error.message());
-                let help = "numbers without a unit, true, false, [lists], {tables} and \"strings\" are; a bare word is a string";
+                let help = "numbers without a unit, true, false, [lists], {tables} and \"strings\" are; a bare word \
+                            is a string";
                 Err(ErrorKind::Override.at(&[], problem, help).with_place(place(span)))
             }
         }

@@ -156,7 +156,11 @@ impl Page {
                             section.warnings aria-label="Warnings" {
                                 h2 { "Warnings" }
                                 p { "The check before the first step found these limits of the result." }
-                                ul { @for (code, message) in &self.warnings { li { code { (code) } " " (with_code(message)) } } }
+                                ul {
+                                    @for (code, message) in &self.warnings {
+                                        li { code { (code) } " " (with_code(message)) }
+                                    }
+                                }
                             }
                         }
                         @for section in &self.sections { (section) }

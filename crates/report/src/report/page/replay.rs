@@ -70,9 +70,10 @@ pub fn replay(label: &str, replay: &Result<Replay, NoReplay>, start: Start) -> M
         Ok(replay) => replay,
         Err(why) => return html! { p { "No replay: " (why) "." } },
     };
-    let [on_demand, at_violation] = [Start::OnDemand, Start::AtViolation].map(|other| start == other);
+    let on_demand = (start == Start::OnDemand).then_some("later");
+    let at_violation = (start == Start::AtViolation).then_some("violation");
     html! {
-        div.replay data-label=(label) data-start=[on_demand.then_some("later")] data-opens=[at_violation.then_some("violation")] {
+        div.replay data-label=(label) data-start=[on_demand] data-opens=[at_violation] {
             script type="application/json" { (PreEscaped(&replay.json)) }
             noscript { p { "The replay needs JavaScript, which is disabled. A still picture replaces it." } }
             div.replay-still { (PreEscaped(&replay.still.svg)) }
