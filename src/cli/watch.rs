@@ -20,7 +20,7 @@ use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::page::Page;
 use tautline_watch::source::{self, Feed, MavlinkFrame, NamingOptions, OwnedPose};
 use tautline_watch::{
-    Assessment, Bound, ClockScope, Expected, Monitor, Notice, Output, Plan, Record, Settings, TimeBase,
+    Assessment, Bound, ClockScope, Expected, Monitor, Notice, Output, Plan, PlanEnd, Record, Settings, TimeBase,
     watch as watch_inputs,
 };
 
@@ -31,7 +31,7 @@ Sources:
   -                     Standard input. Each line is a JSON object with t, id, x, y, z, and vx, vy, vz if known.
                         A line with t, id and event, which is off, is the sign-off of a vehicle.
   mavlink:ADDRESS:PORT  MAVLink over UDP. The system id is the name of a vehicle.
-  rosbridge:HOST:PORT   Topics of ROS, with --topic.
+  rosbridge:HOST:PORT   Topics of ROS with positions or plans of planners, with --topic.
   foxglove:HOST:PORT    Topics with positions of a Foxglove server, all or those of --topic.
 
 A line comes each second and at every change of state: CLEAR, UNDECIDED or VIOLATION. A watch ends with its input or
@@ -100,6 +100,10 @@ pub(super) struct WatchArguments {
     /// Largest deviation from the plan [m].
     #[arg(long, value_name = "METRES", default_value_t = 0.5, allow_negative_numbers = true, requires = "plan")]
     tube: f64,
+    /// What a drone does after the end of a plan that a planner publishes: hold the last point, continue with the last
+    /// velocity, or unknown, which is not judged [default: hold].
+    #[arg(long, value_name = "END", value_parser = plan_end())]
+    plan_end: Option<PlanEnd>,
     /// Write the used positions to a .csv or .mcap file for `tautline audit`, as FILE.partial until the end.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -233,6 +237,9 @@ impl WatchArguments {
         if self.time == TimeBase::Stamps && !matches!(address, Address::Lines) {
             return refuse("a live source needs --time arrival", "omit --time");
         }
+        if self.plan_end.is_some() && !matches!(address, Address::Rosbridge(_)) {
+            return refuse("--plan-end needs plans of planners, which only rosbridge carries", "omit --plan-end");
+        }
         if self.time == TimeBase::Stamps && self.clocks == Some(ClockScope::PerVehicle) {
             return refuse("--time stamps needs one clock for all vehicles", "omit --clocks");
         }
@@ -267,6 +274,7 @@ impl WatchArguments {
             latency_s: bound(self.latency, by_default.latency_s),
             horizon_s: self.horizon,
             tube_m: self.tube,
+            plan_end: self.plan_end,
             expected,
             max_vehicles: self.max_vehicles,
             time_base: self.time,
@@ -474,6 +482,15 @@ fn time_base() -> impl clap::builder::TypedValueParser<Value = TimeBase> {
     one_of(vec![
         (named("arrival", "the arrival of messages here"), TimeBase::Arrival),
         (named("stamps", "the largest stamp so far"), TimeBase::Stamps),
+    ])
+}
+
+fn plan_end() -> impl clap::builder::TypedValueParser<Value = PlanEnd> {
+    let named = |end: PlanEnd, help: &'static str| (PossibleValue::new(end.name()).help(help), end);
+    one_of(vec![
+        named(PlanEnd::Hold, "hold the last point"),
+        named(PlanEnd::Continue, "continue with the last velocity"),
+        named(PlanEnd::Unknown, "unknown, not judged"),
     ])
 }
 

@@ -1,5 +1,6 @@
 //! Output of the monitor as plain data. Vehicles are indices into [`Monitor::names`](crate::Monitor::names).
 
+use tautline_audit::recorded::PlanConflict;
 use tautline_audit::{Status, Violation};
 use tautline_core::{coded, impl_coded};
 
@@ -25,6 +26,8 @@ pub enum Reason {
     Fault(Fault, Option<u32>),
     /// The bounds allow a pair to be closer than delta: the smallest possible separation \[m\].
     Uncertain(Pair, f64),
+    /// The plans of two drones are closer than delta, now or later. Times are those of the monitor \[s\].
+    PlanConflict(PlanConflict),
     /// A pair is in a measured violation. Only of a sign-off.
     Violation(Pair),
     /// The stamp of a sign-off is older than the newest position of its vehicle: both stamps \[s\].
@@ -42,6 +45,7 @@ impl_coded! { Reason {
     Self::ErrorUnknown(_) => "error-unknown",
     Self::Fault(..) => "fault",
     Self::Uncertain(..) => "uncertain",
+    Self::PlanConflict(_) => "plan-conflict",
     Self::Violation(_) => "violation",
     Self::Late(_) => "late",
     Self::Repeated(_) => "repeated",
@@ -235,6 +239,19 @@ pub enum Problem {
     NoPosition(String),
     /// The message has no subscription.
     NoSubscription,
+    /// The plan of a planner cannot be used: the reason.
+    WrongPlan(String),
+    /// The plan of a planner starts more than a minute from its arrival: start after the arrival \[s\], and the clock.
+    OtherPlanClock(f64, PlanClock),
+}
+
+/// Clock by which the starts of plans are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlanClock {
+    /// Common clock of the positions.
+    Positions,
+    /// Clock of this machine.
+    Machine,
 }
 
 impl_coded! { Problem {
@@ -260,6 +277,8 @@ impl_coded! { Problem {
     Self::NotOfTopic => "not-of-topic",
     Self::NoPosition(_) => "no-position",
     Self::NoSubscription => "no-subscription",
+    Self::WrongPlan(_) => "wrong-plan",
+    Self::OtherPlanClock(..) => "other-plan-clock",
 } }
 
 /// Loss of a source.
@@ -327,6 +346,15 @@ pub enum Event {
         /// Whether the deviation is above the limit.
         is_outside: bool,
         /// Time \[s\].
+        at_s: f64,
+    },
+    /// A plan of a planner is closer to another one than delta. Times are those of the monitor.
+    PlanConflict {
+        /// The two plans, and the time of the conflict.
+        conflict: PlanConflict,
+        /// Time from the arrival of the later plan to the start of the conflict \[s\].
+        left_s: f64,
+        /// Time of the arrival \[s\].
         at_s: f64,
     },
     /// Errors of the input since the last event of this kind.

@@ -35,7 +35,9 @@ mod violations;
 mod words;
 
 pub use clock::{DRIFT, STEP_S};
-pub use event::{Assessment, Event, Fault, Loss, MessageError, Pair, PairTime, Problem, Reason, Separation, State};
+pub use event::{
+    Assessment, Event, Fault, Loss, MessageError, Pair, PairTime, PlanClock, Problem, Reason, Separation, State,
+};
 pub use history::HISTORY;
 pub use monitor::{LONGEST_NAME, MOST_EVENTS, Monitor, Pose, Taken};
 pub use notice::{Notice, Statement};
@@ -45,5 +47,7 @@ pub use session::{ASSESS_PERIOD_S, LINE_PERIOD_S, Output, Summary, watch};
 pub use settings::{
     Bound, ClockScope, DEFAULT_ACCEL_M_S2, Expected, REPORTED_DEVIATIONS, Settings, SettingsError, TimeBase,
 };
+pub use tautline_audit::recorded::{PlanConflict, PlanReference};
 pub use tautline_audit::{Status, Violation};
+pub use tautline_core::track::PlanEnd;
 pub use violations::MOST_OPEN;

@@ -5,7 +5,8 @@ use serde_json::{Map, Value, json};
 use crate::event::{Assessment, Event, Fault, Loss, MessageError, Pair, PairTime, Problem, Reason, State};
 use crate::monitor::Monitor;
 use crate::session::Summary;
-use crate::words::{Subject, name, sentence};
+use crate::words::{self, Subject, name, sentence};
+use tautline_audit::recorded::PlanReference;
 use tautline_audit::{Status, Violation};
 use tautline_core::fact::Coded;
 use tautline_core::impl_coded;
@@ -34,6 +35,7 @@ impl_coded! { Statement<'_> {
     Self::Event(Event::Began(_), _) => "violation",
     Self::Event(Event::Ended(_), _) => "violation-end",
     Self::Event(Event::Plan { .. }, _) => "plan",
+    Self::Event(Event::PlanConflict { .. }, _) => "plan-conflict",
     Self::Event(Event::Fault { .. }, _) => "fault",
     Self::Connected(_) => "connected",
     Self::Lost(..) => "lost",
@@ -53,6 +55,7 @@ impl<'a> Statement<'a> {
                 | Event::SignedOff { at_s, .. }
                 | Event::Back { at_s, .. }
                 | Event::Plan { at_s, .. }
+                | Event::PlanConflict { at_s, .. }
                 | Event::Fault { at_s, .. } => at_s,
             },
             Self::Connected(_) | Self::Lost(..) | Self::Summary(_) => monitor.now_s(),
@@ -66,7 +69,9 @@ impl<'a> Statement<'a> {
             Self::Event(Event::Began(_) | Event::Ended(_) | Event::Plan { is_outside: true, .. }, _) => {
                 Status::Violation
             }
-            Self::Event(Event::Stale { .. } | Event::Fault { .. }, _) | Self::Lost(..) => Status::Undecided,
+            Self::Event(Event::Stale { .. } | Event::PlanConflict { .. } | Event::Fault { .. }, _) | Self::Lost(..) => {
+                Status::Undecided
+            }
             Self::Event(..) | Self::Connected(_) => Status::Clear,
             Self::Summary(of) if of.was_off_plan => Status::Violation,
             Self::Summary(of) => of.status(),
@@ -99,6 +104,17 @@ impl<'a> Statement<'a> {
                 Event::Plan { vehicle, deviation_m, is_outside, .. } => {
                     json!({ "vehicle": name(vehicle), "deviation_m": deviation_m, "outside": is_outside })
                 }
+                Event::PlanConflict { conflict, left_s, .. } => json!({
+                    "plan": planned(conflict.plan, monitor),
+                    "other": planned(conflict.other, monitor),
+                    "from_s": conflict.from_s,
+                    "to_s": conflict.to_s,
+                    "min_m": conflict.lower_m,
+                    "min_at_s": conflict.min_at_s,
+                    "limit": conflict.limit_m,
+                    "left_s": left_s,
+                    "facts": monitor.plan_facts(),
+                }),
                 Event::Fault { fault, count, vehicle, .. } => {
                     json!({ "fault": fault, "count": count, "vehicle": vehicle.map(name) })
                 }
@@ -146,6 +162,9 @@ impl Notice {
         let mut json = Map::from_iter([("event".to_owned(), event.into()), ("t_s".to_owned(), json!(at_s))]);
         if let Value::Object(data) = of.data(monitor) {
             json.extend(data);
+        }
+        if let Statement::Summary(Summary { plans: Some([count, conflicts]), .. }) = of {
+            json.insert("plans".to_owned(), json!({ "count": count, "conflicts": conflicts }));
         }
         if matches!(of, Statement::State(_) | Statement::Lost(..) | Statement::Event(Event::Fault { .. }, _)) {
             let reason = of.cause().map(|cause| {
@@ -205,6 +224,11 @@ fn finding(of: &Violation<Pair>, monitor: &Monitor) -> Value {
     })
 }
 
+/// Returns a plan of a planner.
+fn planned(plan: PlanReference, monitor: &Monitor) -> Value {
+    json!({ "vehicle": monitor.drone(plan.vehicle), "number": plan.number, "published_s": plan.published_s })
+}
+
 /// Returns the data of a cause, whose keys depend on its code.
 fn cause_data(cause: Subject<'_>, monitor: &Monitor) -> Value {
     let name = |vehicle: u32| name(monitor, vehicle);
@@ -219,6 +243,12 @@ fn cause_data(cause: Subject<'_>, monitor: &Monitor) -> Value {
             Reason::VelocityUnknown(vehicle) | Reason::ErrorUnknown(vehicle) => json!({ "vehicle": name(vehicle) }),
             Reason::Fault(fault, vehicle) => json!({ "fault": fault, "vehicle": vehicle.map(name) }),
             Reason::Uncertain(pair, least_m) => json!({ "subjects": pair.map(name), "least_m": least_m }),
+            Reason::PlanConflict(conflict) => json!({
+                "plan": planned(conflict.plan, monitor),
+                "other": planned(conflict.other, monitor),
+                "from_s": conflict.from_s,
+                "to_s": conflict.to_s,
+            }),
             Reason::Violation(pair) => json!({ "subjects": pair.map(name) }),
             Reason::Late([stamp_s, newest_s]) | Reason::Repeated([stamp_s, newest_s]) => {
                 json!({ "stamp_s": stamp_s, "newest_s": newest_s })
@@ -232,7 +262,9 @@ fn cause_data(cause: Subject<'_>, monitor: &Monitor) -> Value {
                 | Problem::NotHeard(text)
                 | Problem::NotDecoded(text)
                 | Problem::ServerError(text)
-                | Problem::NoPosition(text) => (json!(text), Value::Null),
+                | Problem::NoPosition(text)
+                | Problem::WrongPlan(text) => (json!(text), Value::Null),
+                Problem::OtherPlanClock(lead_s, clock) => (json!(lead_s), json!(words::clock_of_plans(*clock))),
                 Problem::UnknownFlags(byte) | Problem::NoFrameStart(byte) => (json!(byte), Value::Null),
                 Problem::WrongChecksum([message, system]) => (json!(message), json!(system)),
                 _ => (Value::Null, Value::Null),

@@ -10,7 +10,7 @@ use crate::event::{Assessment, Event, Fault, MessageError, Problem, Reason, Stat
 use crate::monitor::Monitor;
 use crate::notice::{Notice, Statement};
 use crate::settings::TimeBase;
-use crate::source::{Input, Inputs, OwnedPose};
+use crate::source::{Input, Inputs, OwnedPose, PlanMessage};
 use crate::words::name;
 use tautline_audit::Status;
 
@@ -70,6 +70,8 @@ pub struct Summary {
     pub compared: Option<u64>,
     /// Number of measured violations.
     pub violations: u64,
+    /// Number of plans of planners and of their conflicts, if there was a plan.
+    pub plans: Option<[u64; 2]>,
     /// Number of vehicles.
     pub vehicles: usize,
     /// Number of vehicles that had signed off at the end.
@@ -166,6 +168,7 @@ impl Session<'_> {
     fn take(&mut self, input: Input) -> io::Result<bool> {
         match input {
             Input::Pose(pose, arrival_s) => self.pose(&pose, arrival_s)?,
+            Input::Plan(message) => self.plan(&message)?,
             Input::SignOff(id, t_s, arrival_s) => self.sign_off(&id, t_s, arrival_s)?,
             Input::Garbage(error, arrival_s) => {
                 self.message_error = Some(error);
@@ -188,6 +191,14 @@ impl Session<'_> {
         let borrowed = pose.borrowed();
         if let Some(taken) = self.monitor.take(&borrowed, arrival_s) {
             self.output.pose(taken.time_s, pose)?;
+        }
+        self.pass_events()
+    }
+
+    fn plan(&mut self, message: &PlanMessage) -> io::Result<()> {
+        if let Err(problem) = self.monitor.take_plan(message) {
+            self.message_error = Some(MessageError { place: message.topic.clone(), problem });
+            self.monitor.fault(Fault::Garbage, None, message.arrival_s);
         }
         self.pass_events()
     }
@@ -334,6 +345,8 @@ impl Session<'_> {
                     note_closest(&mut self.summary, of.min_m, || of.pair.map(|k| name(&self.monitor, k)));
                 }
                 Event::Plan { is_outside: true, .. } => self.summary.was_off_plan = true,
+                // The conflict may be withdrawn before the next judgement.
+                Event::PlanConflict { .. } => self.summary.was_undecided |= self.summary.has_started,
                 _ => {}
             }
             let statement = Statement::Event(&event, self.message_error.as_ref());
@@ -347,6 +360,7 @@ impl Session<'_> {
         self.judged(of)?;
         self.summary.violations = self.monitor.violations();
         self.summary.compared = self.monitor.compared();
+        self.summary.plans = self.monitor.plan_counts();
         self.output.notice(&Notice::new(Statement::Summary(&self.summary), &self.monitor))?;
         Ok(self.summary)
     }

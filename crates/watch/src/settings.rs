@@ -6,6 +6,7 @@ use tautline_core::option::{
     ACCEL, BRAKE, DELTA, EXPECT, HORIZON, IDS, LATENCY, MAX_AGE, MAX_VEHICLES, Opt, POSITION_ERROR, TUBE,
     VELOCITY_ERROR,
 };
+use tautline_core::track::PlanEnd;
 
 /// Default bound on the acceleration \[m/s^2\].
 ///
@@ -104,6 +105,8 @@ pub struct Settings {
     pub horizon_s: f64,
     /// Largest deviation from the plan \[m\].
     pub tube_m: f64,
+    /// Motion after the end of a plan of a planner; `None` for the default, which holds the last point.
+    pub plan_end: Option<PlanEnd>,
     /// Vehicles that must be heard.
     pub expected: Expected,
     /// Largest number of vehicles.
@@ -129,6 +132,7 @@ impl Default for Settings {
             latency_s: Bound::default_of(0.0),
             horizon_s: 10.0,
             tube_m: 0.5,
+            plan_end: None,
             expected: Expected::Heard,
             max_vehicles: 2000,
             time_base: TimeBase::Arrival,
@@ -196,21 +200,25 @@ impl Settings {
             ClockScope::Common => "common",
             ClockScope::PerVehicle => "own",
         };
-        let source_of_clocks = match self.clocks {
-            Some(_) => Source::Declared,
-            None if self.has_message_counts => Source::Convention,
-            None => Source::Default,
-        };
         let others = [
             self.accel_m_s2.fact(FactKind::Acceleration, "m/s^2"),
             self.velocity_error_m_s.fact(FactKind::VelocityError, "m/s"),
             self.max_age_s.fact(FactKind::Age, "s"),
             self.latency_s.fact(FactKind::Latency, "s"),
-            Fact::name(FactKind::Clock, source_of_clocks, clocks),
+            Fact::name(FactKind::Clock, self.source_of_clocks(), clocks),
             Fact::name(FactKind::LengthUnit, Source::Convention, "m"),
             Fact::name(FactKind::TimeUnit, Source::Convention, "s"),
         ];
         position_error.into_iter().chain(others).collect()
+    }
+
+    /// Returns the source of [`clock_scope`](Self::clock_scope).
+    pub(crate) fn source_of_clocks(&self) -> Source {
+        match self.clocks {
+            Some(_) => Source::Declared,
+            None if self.has_message_counts => Source::Convention,
+            None => Source::Default,
+        }
     }
 
     /// Checks the ranges of all numbers.

@@ -1,11 +1,12 @@
 //! Sentences of a watch. No state, code or exit code depends on them.
 
-use crate::event::{Assessment, Event, Fault, Loss, MessageError, Pair, Problem, Reason, State};
+use crate::event::{Assessment, Event, Fault, Loss, MessageError, Pair, PlanClock, Problem, Reason, State};
 use crate::monitor::Monitor;
 use crate::notice::Statement;
 use crate::session::Summary;
 use crate::settings::REPORTED_DEVIATIONS;
 use tautline_audit::Status;
+use tautline_audit::recorded::{PlanConflict, PlanReference};
 use tautline_core::fact::{Coded as _, Fact, FactKind, FactValue, Source};
 use tautline_core::option::{ACCEL, FRAME, MAX_VEHICLES, ORIGIN, POSITION_ERROR, TOPIC};
 use tautline_core::text::{at_least, at_most, counted, in_order, seconds};
@@ -141,6 +142,7 @@ fn event(event: &Event, cause: Option<Subject<'_>>, monitor: &Monitor) -> String
             format!("OFF PLAN {} {} m (tube {} m)", name(vehicle), at_most(deviation_m, 2), settings.tube_m)
         }
         Event::Plan { vehicle, .. } => format!("{} is within {} m of its plan again", name(vehicle), settings.tube_m),
+        Event::PlanConflict { conflict, left_s, .. } => plan_conflict(&conflict, left_s, monitor),
         Event::Fault { fault, count, vehicle, .. } => {
             let times = if count > 1 { format!(" ({count} times)") } else { String::new() };
             let cause = match cause {
@@ -150,6 +152,38 @@ fn event(event: &Event, cause: Option<Subject<'_>>, monitor: &Monitor) -> String
             };
             format!("{}{times}{cause}", self::fault(fault, vehicle.map(name).as_deref()))
         }
+    }
+}
+
+/// Returns the sentence of a conflict of two plans that begins in `left_s` \[s\].
+fn plan_conflict(conflict: &PlanConflict, left_s: f64, monitor: &Monitor) -> String {
+    let [plan, other] = [conflict.plan, conflict.other].map(|plan| {
+        let published = seconds(plan.published_s);
+        format!("{} (published at {published})", planned(plan, monitor))
+    });
+    let min_at = conflict.min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
+    let min_m = at_least(conflict.lower_m, 2);
+    let facts = monitor.plan_facts();
+    let end = facts.iter().find(|fact| fact.kind == FactKind::PlanEnd);
+    let end = end.map_or_else(String::new, |end| format!("; {end} ({})", end.source.code()));
+    format!(
+        "{plan} and {other} come to {min_m} m{min_at} (delta {} m): closer than delta from {} to {}, in {} s{end}",
+        conflict.limit_m,
+        seconds(conflict.from_s),
+        seconds(conflict.to_s),
+        at_least(left_s, 2)
+    )
+}
+
+fn planned(plan: PlanReference, monitor: &Monitor) -> String {
+    format!("plan {} of drone {}", plan.number, monitor.drone(plan.vehicle))
+}
+
+/// Returns the clock of the starts of plans.
+pub(crate) fn clock_of_plans(clock: PlanClock) -> &'static str {
+    match clock {
+        PlanClock::Positions => "the clock of the positions",
+        PlanClock::Machine => "the clock of this machine",
     }
 }
 
@@ -184,6 +218,13 @@ fn reason(reason: Reason, monitor: &Monitor) -> String {
             joined(pair, monitor),
             at_least(least_m.max(0.0), 2),
             monitor.settings().delta_m
+        ),
+        Reason::PlanConflict(of) => format!(
+            "{} and {} are closer than delta from {} to {}",
+            planned(of.plan, monitor),
+            planned(of.other, monitor),
+            seconds(of.from_s),
+            seconds(of.to_s)
         ),
         Reason::Violation(pair) => format!("{} are in a measured violation", joined(pair, monitor)),
         Reason::Late([stamp_s, newest_s]) => format!(
@@ -288,6 +329,14 @@ fn message(MessageError { place, problem }: &MessageError) -> String {
         Problem::NotOfTopic => "not a message of a topic".to_owned(),
         Problem::NoPosition(topic) => format!("the message of {topic} has no position that is read"),
         Problem::NoSubscription => "a message has no subscription".to_owned(),
+        Problem::WrongPlan(why) => {
+            format!("the plan cannot be used: {why}; check the planner and its version, or omit the topic from {TOPIC}")
+        }
+        Problem::OtherPlanClock(lead_s, clock) => format!(
+            "the plan starts {} s from its arrival by {}; set one clock for planner, positions and this machine",
+            at_most(lead_s.abs(), 0),
+            clock_of_plans(*clock)
+        ),
     };
     if place.is_empty() { problem } else { format!("{place}: {problem}") }
 }
@@ -321,6 +370,9 @@ fn summary(of: &Summary, monitor: &Monitor) -> String {
     }
     if let Some((distance_m, pair)) = &of.closest {
         text.extend([format!("; closest {} {} m", pair.join(" and "), at_least(*distance_m, 2))]);
+    }
+    if let Some([count, conflicts]) = of.plans {
+        text.extend([format!("; plans: {count}, conflicts: {conflicts}")]);
     }
     if let Some(count) = of.compared {
         text.extend([format!("; positions compared with the plan: {count}")]);

@@ -63,7 +63,7 @@ pub use error::{ContentKind, Fault, Place, ReadError};
 pub use format::{Format, FormatInfo};
 pub use heading::is_read;
 #[cfg(feature = "mcap")]
-pub use mcap::{Channels, LivePose, has_live_poses, live_poses};
+pub use mcap::{Channels, LivePlan, LivePose, has_live_poses, live_plans, live_poses};
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, MessageClock, ReadOptions, Scale};
 pub use order::Recording;
 #[cfg(feature = "shows")]

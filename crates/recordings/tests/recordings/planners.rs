@@ -3,8 +3,9 @@
 use std::fs;
 
 use nalgebra::Vector3;
+use serde_json::{Value, json};
 use tautline_core::track::{Item, Piece, PlanEnd};
-use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
+use tautline_recordings::read::{self, Format, LivePlan, ReadError, ReadOptions};
 
 use crate::messages::{Message, SEC, Stamp, cdr, header, mcap_of, read_bytes, whole};
 use crate::recording::{Whole, assert_refused};
@@ -299,6 +300,130 @@ fn wrong_curves_name_the_field_and_its_value() {
         "recording/damaged",
         &format!("curve 1 on topic `{TOPIC}`"),
     );
+}
+
+#[test]
+fn a_list_of_b_splines_is_read_to_its_end() {
+    // The first element has angles, the second one is of a drone that has published nothing.
+    let mut turning = spline(4, 0, 0.0);
+    (turning.6, turning.7) = (vec![1.0, 2.0], 0.1);
+    let silent = (5, 0, 0, (0, 0), vec![], vec![], vec![], 0.0);
+    let list = cdr(&(3, vec![turning, silent, spline(7, 0, 5.0)]), true);
+    let found = whole("plan.mcap", &mcap_of(&[("/swarm_trajs", "traj_utils/msg/MultiBsplines", "cdr", 7, list)]));
+    assert_eq!(found.vehicles, ["4", "7"]);
+    assert_near(position(&found, "7", 1.0), [2.0, 5.0, 1.0]);
+}
+
+/// Returns a B-spline in the JSON of rosbridge.
+fn spline_in_json(drone: i32) -> Value {
+    let points: Vec<_> = (0..7).map(|k| json!({ "x": k, "y": 2, "z": 1 })).collect();
+    let knots: Vec<_> = (0..11).map(|k| f64::from(k) - 3.0).collect();
+    json!({
+        "drone_id": drone, "order": 3, "traj_id": 1, "start_time": { "sec": SEC, "nanosec": 250_000_000 },
+        "knots": knots, "pos_pts": points, "yaw_pts": [], "yaw_dt": 0.0,
+    })
+}
+
+fn minco_in_json() -> Value {
+    json!({
+        "drone_id": 2, "traj_id": 1, "start_time": { "sec": SEC, "nanosec": 500_000_000 }, "des_clearance": 0.5,
+        "order": 5, "start_p": [0, 0, 1], "start_v": [0, 0, 0], "start_a": [0, 0, 0], "end_p": [2, 0, 1],
+        "end_v": [0, 0, 0], "end_a": [0, 0, 0], "inner_x": [1], "inner_y": [0.5], "inner_z": [1],
+        "duration": [1, 1],
+    })
+}
+
+fn polynomials_in_json() -> Value {
+    json!({
+        "drone_id": 2, "traj_id": 1, "start_time": { "sec": SEC, "nanosec": 500_000_000 }, "order": 5,
+        "coef_x": [0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1], "coef_y": [0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 2, 1],
+        "coef_z": [0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1], "duration": [1, 2],
+    })
+}
+
+fn live(message: &Value) -> Vec<LivePlan> {
+    read::live_plans(message).expect("a message of a planner").expect("a valid one")
+}
+
+/// Asserts that a message in JSON has the plan of the same message in a bag.
+fn assert_same(message: &Value, bag: &[Message]) {
+    let found = whole("plan.mcap", &mcap_of(bag));
+    let recorded = found.plans.first().expect("a plan");
+    let plans = live(message);
+    let [plan] = &plans[..] else { panic!("{plans:?}") };
+    assert_eq!(found.vehicles, [plan.drone.to_string()]);
+    let start_s = (plan.start_ns - found.clock.epoch_ns) as f64 * 1e-9;
+    for (own, other) in plan.pieces.iter().zip(&recorded.pieces) {
+        assert!((own.from_s + start_s - other.from_s).abs() < 1e-12 && own.coefficients == other.coefficients);
+        assert!((own.to_s + start_s - other.to_s).abs() < 1e-12, "{own:?} {other:?}");
+    }
+    assert_eq!(plan.pieces.len(), recorded.pieces.len());
+}
+
+#[test]
+fn json_of_a_live_source_has_the_plans_of_the_same_messages_in_a_bag() {
+    assert_same(&spline_in_json(4), &[of(&spline(4, 250_000_000, 2.0))]);
+    assert_same(&minco_in_json(), &[of_minco(&minco(2, 0.5))]);
+    assert_same(&polynomials_in_json(), &[of_polynomials(&polynomials(2))]);
+    assert!(live(&spline_in_json(4))[0].is_held && !live(&minco_in_json())[0].is_held);
+    // ROS 1 has other names of times.
+    let mut first = spline_in_json(4);
+    first["start_time"] = json!({ "secs": SEC, "nsecs": 250_000_000 });
+    assert_eq!(live(&first), live(&spline_in_json(4)));
+    // In a list, a drone that has published nothing has no points.
+    let mut silent = spline_in_json(5);
+    (silent["knots"], silent["pos_pts"]) = (json!([]), json!([]));
+    let list = json!({ "drone_id_from": 1, "traj": [spline_in_json(4), silent, spline_in_json(7)] });
+    assert_eq!(live(&list).iter().map(|plan| plan.drone).collect::<Vec<_>>(), [4, 7]);
+    for other in [json!({}), json!([]), json!(null), json!({ "traj": [] }), json!({ "pose": { "position": 1 } })] {
+        assert_eq!(read::live_plans(&other), None, "{other}");
+    }
+}
+
+#[test]
+fn wrong_fields_in_json_are_errors() {
+    let list = json!({ "drone_id_from": 1, "traj": [spline_in_json(4)] });
+    let mut all = 0;
+    for message in [spline_in_json(4), minco_in_json(), polynomials_in_json(), list] {
+        let fields: Vec<_> = message.as_object().expect("an object").keys().cloned().collect();
+        for field in fields {
+            let wrongs = [Some(json!("word")), Some(json!({})), Some(json!([[1]])), Some(json!(1e300)), None];
+            for wrong in wrongs {
+                let mut spoiled = message.clone();
+                match wrong {
+                    Some(wrong) => spoiled[&field] = wrong,
+                    None => drop(spoiled.as_object_mut().expect("an object").remove(&field)),
+                }
+                // A field by which messages are recognised may be missing; a number of any size may be an angle.
+                if let Some(Ok(plans)) = read::live_plans(&spoiled) {
+                    assert!(["yaw_dt", "des_clearance"].contains(&field.as_str()), "{field}: {plans:?}");
+                }
+                all += 1;
+            }
+        }
+    }
+    assert_eq!(all, 5 * (8 + 15 + 8 + 2));
+    type Spoil = (fn() -> Value, &'static str, Value, &'static str);
+    let spoils: [Spoil; 8] = [
+        (|| spline_in_json(4), "/order", json!(16), "order: must be 1 to 15, got 16"),
+        (|| spline_in_json(4), "/start_time/nanosec", json!(1_000_000_000), "start_time.nanosec: must be below"),
+        (|| spline_in_json(4), "/pos_pts/1/x", json!(null), "invalid type: null"),
+        (|| spline_in_json(4), "/knots/5", json!(0.5), "knots[5]: must not be below the knot before it"),
+        (minco_in_json, "/duration/1", json!(0), "duration[1]: must be positive, got 0 s"),
+        (minco_in_json, "/end_v/1", json!(1e300), "end_v[1]: must be a finite number, got inf"),
+        (polynomials_in_json, "/order", json!(7), "order: must be 5, got 7"),
+        (polynomials_in_json, "/coef_y", json!([1]), "coef_y: 2 durations need 12 numbers, got 1"),
+    ];
+    for (message, path, wrong, problem) in spoils {
+        let mut spoiled = message();
+        *spoiled.pointer_mut(path).expect(path) = wrong;
+        let error = read::live_plans(&spoiled).expect("a message of a planner").expect_err(path);
+        assert!(error.contains(problem), "{path}: {error}");
+    }
+    // Numbers whose coefficients overflow.
+    let mut large = spline_in_json(4);
+    (large["pos_pts"][1]["x"], large["pos_pts"][2]["x"]) = (json!(f64::MAX), json!(f64::MIN));
+    assert_eq!(read::live_plans(&large), Some(Err("a value exceeds the range of numbers".to_owned())));
 }
 
 /// Quarter of a parabola: x = t, y = t^2 over 2 s, as a Bezier curve of degree 2.

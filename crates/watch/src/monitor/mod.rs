@@ -3,6 +3,7 @@
 mod faults;
 mod intake;
 mod past;
+mod plans;
 mod present;
 mod sign_off;
 
@@ -19,6 +20,7 @@ use crate::velocity::VelocityEnclosure;
 use crate::violations::OpenViolations;
 use faults::FaultCount;
 use past::SweptBox;
+use plans::PublishedPlans;
 use tautline_audit::Violation;
 use tautline_core::fact::{Fact, FactKind, Source};
 
@@ -109,6 +111,8 @@ pub struct Monitor {
     violations: OpenViolations,
     /// Number of poses that were compared with the plan.
     compared: u64,
+    /// Plans of planners; `None` before the first one.
+    plans: Option<PublishedPlans>,
     judgement: u64,
     ahead: ahead::Scratch,
     boxes: Vec<SweptBox>,
@@ -144,6 +148,7 @@ impl Monitor {
             suppressed: 0,
             violations: OpenViolations::new(),
             compared: 0,
+            plans: None,
             judgement: 0,
             ahead: ahead::Scratch::default(),
             boxes: Vec::new(),
@@ -199,6 +204,7 @@ impl Monitor {
             facts.push(Fact::new(FactKind::VelocityAgreement, seen(is_observed)));
         }
         facts.push(Fact::new(FactKind::OneStream, seen(self.settings.shows_two_streams())));
+        facts.extend(self.plan_facts());
         facts
     }
 

@@ -63,6 +63,9 @@ impl Monitor {
                 _ => {}
             }
         }
+        if let Some(conflict) = self.plan_conflict() {
+            note(Reason::PlanConflict(conflict));
+        }
         self.report_faults();
         let found = self.ahead.search(&self.settings);
         let measured = self.violations.worst();

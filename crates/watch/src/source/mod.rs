@@ -17,6 +17,7 @@ use nalgebra::Vector3;
 
 use crate::event::{Loss, MessageError};
 use crate::monitor::Pose;
+use tautline_recordings::read::LivePlan;
 
 pub use foxglove::foxglove;
 pub use lines::{LONGEST_LINE, input_of_line, lines};
@@ -53,11 +54,26 @@ impl OwnedPose {
     }
 }
 
+/// Plan of a planner in a message of a topic.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlanMessage {
+    /// Topic.
+    pub topic: String,
+    /// The plan.
+    pub plan: LivePlan,
+    /// Arrival since the start of the watch \[s\].
+    pub arrival_s: f64,
+    /// Arrival on the clock of this machine, since 1970 \[ns\].
+    pub arrival_ns: i64,
+}
+
 /// Input of a watch.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Input {
     /// A pose, and its arrival since the start of the watch \[s\].
     Pose(OwnedPose, f64),
+    /// A plan of a planner.
+    Plan(PlanMessage),
     /// The sign-off of a vehicle: its name, its stamp \[s\] and its arrival \[s\].
     SignOff(String, f64, f64),
     /// A message that cannot be read, and its arrival \[s\].

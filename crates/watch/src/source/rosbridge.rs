@@ -1,16 +1,18 @@
 //! rosbridge: topics of ROS 1 and ROS 2 as JSON over a WebSocket.
 //!
 //! The protocol needs two kinds of messages, so this is a client over `tungstenite`. `roslibrust` would bring an
-//! asynchronous runtime and generated types of messages. Only positions are read here.
+//! asynchronous runtime and generated types of messages. Only positions and plans of planners are read here.
+
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
 use super::websocket::{Incoming, Protocol, websocket};
-use super::{Feed, Input, Naming, NamingOptions};
+use super::{Feed, Input, Naming, NamingOptions, PlanMessage};
 use crate::event::{MessageError, Problem};
 use tautline_core::option::TOPIC;
-use tautline_recordings::read::LivePose;
+use tautline_recordings::read::{LivePose, live_plans};
 
 /// Connects to a server of rosbridge and subscribes to the topics of the options.
 ///
@@ -51,11 +53,11 @@ impl Protocol for Rosbridge {
     }
 }
 
-/// Appends the poses of a message of the server that arrived at a time \[s\], and the errors of those that cannot be
-/// used.
+/// Appends the poses or plans of a message of the server that arrived at a time \[s\], and the errors of those that
+/// cannot be used.
 ///
 /// # Errors
-/// If the message is none of rosbridge, reports an error, or has no positions.
+/// If the message is none of rosbridge, reports an error, or has neither positions nor plans.
 pub fn inputs_of_message(
     text: &str,
     naming: &mut Naming,
@@ -70,9 +72,29 @@ pub fn inputs_of_message(
         Some("status") => return Ok(()),
         _ => return Err(Problem::NotOfTopic),
     }
+    if let Some(plans) = live_plans(&of["msg"]) {
+        match plans {
+            Ok(plans) => {
+                let arrival_ns = machine_ns();
+                let message = |plan| PlanMessage { topic: topic.to_owned(), plan, arrival_s, arrival_ns };
+                inputs.extend(plans.into_iter().map(message).map(Input::Plan));
+            }
+            Err(why) => {
+                let error = MessageError { place: topic.to_owned(), problem: Problem::WrongPlan(why) };
+                inputs.push(Input::Garbage(error, arrival_s));
+            }
+        }
+        return Ok(());
+    }
     let poses = live_poses(&of["msg"]).ok_or_else(|| Problem::NoPosition(topic.to_owned()))?;
     inputs.extend(poses.into_iter().filter_map(|pose| naming.input(topic, pose, arrival_s)));
     Ok(())
+}
+
+/// Returns the time of this machine since 1970 \[ns\].
+fn machine_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 /// Returns the positions of a message of ROS by its fields, as rosbridge does not send its type.

@@ -28,6 +28,7 @@ mod tree;
 
 pub use messages::{LivePose, has_live_poses, live_poses};
 pub use own::Channels;
+pub use planned::{LivePlan, live_plans};
 
 use std::path::Path;
 

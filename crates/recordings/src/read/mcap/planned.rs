@@ -1,5 +1,6 @@
 //! Reads curves of planners: `traj_utils/msg/Bspline` and `traj_utils/msg/MultiBsplines` of EGO-Planner, and
-//! `traj_utils/msg/MINCOTraj` and `traj_utils/msg/PolyTraj` of its version 2. The definitions in the bag decide.
+//! `traj_utils/msg/MINCOTraj` and `traj_utils/msg/PolyTraj` of its version 2. The definitions in the bag decide. JSON of
+//! a live source has no definitions: its fields decide.
 //!
 //! A curve of a drone is flown from its start until the next one of that drone starts. The whole curve is a published
 //! plan ([`Published`]). The trajectory server of the first version holds the last point of a curve. That of the second
@@ -14,6 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use super::super::curves::{Curves, HIGHEST_DEGREE, VehicleItems, piece, value};
 use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
@@ -28,7 +30,7 @@ use crate::mcap::topic::{CDR, DeclaredTopic, Part as FilePart, decode};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::{CLOCK, DUPLICATES, FRAME, ORIGIN, PLAN_END, SORT, TOPIC};
 use tautline_core::text::counted;
-use tautline_core::track::{Clock, Item, Metadata, Plan as Published, PlanEnd};
+use tautline_core::track::{Clock, Item, Metadata, Piece, Plan as Published, PlanEnd};
 
 /// Degree of the curves of EGO-Planner v2.
 const DEGREE: u8 = 5;
@@ -79,7 +81,8 @@ pub(super) fn open(
         if message.of.definition.is_empty() {
             undefined.insert(message.of.topic.clone());
         }
-        let plans = Plan::all_of(kind, message.of, message.bytes).map_err(|fault| fault.at(place()))?;
+        let plans = Message::in_cdr(kind, message.of, message.bytes).and_then(Message::plans);
+        let plans = plans.map_err(|fault| fault.at(place()))?;
         for (drone, plan) in plans {
             let start_ns = plan.start_ns;
             match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
@@ -244,32 +247,10 @@ impl Plan {
         [&coefficients[..], &powers].map(|coefficients| value(coefficients, to_s - from_s))
     }
 
-    /// Returns the drones and the curves of a message. A list of B-splines has elements without points for drones that
-    /// have published nothing.
-    fn all_of(kind: CurveKind, topic: &DeclaredTopic, bytes: &[u8]) -> Result<Vec<(i32, Self)>, Fault> {
-        let encoding = &*topic.encoding;
-        match kind {
-            CurveKind::BSpline => Ok(vec![Self::of_b_spline(decoded(encoding, bytes)?)?]),
-            CurveKind::BSplines => {
-                // The angles of an element and their interval follow its points.
-                let (_from, list): (i32, Vec<(Bspline, Vec<f64>, f64)>) = decoded(encoding, bytes)?;
-                let list = list.into_iter().map(|(spline, ..)| spline);
-                let is_published = |spline: &Bspline| !(spline.points.is_empty() && spline.knots.is_empty());
-                list.filter(is_published).map(Self::of_b_spline).collect()
-            }
-            CurveKind::Minco => Ok(vec![Self::of_minco(encoding, bytes)?]),
-            CurveKind::Polynomials => Ok(vec![Self::of_polynomials(encoding, bytes)?]),
-            CurveKind::Unsupported => {
-                let found = fields(&topic.definition).replace('\n', ", ");
-                let problem = format!("the definition of {} has other fields: {found}", quoted(&topic.schema));
-                refuse(ContentKind::UnsupportedFormat, problem, replan())
-            }
-        }
-    }
-
     /// Returns the drone and the curve of a B-spline.
     fn of_b_spline(message: Bspline) -> Result<(i32, Self), Fault> {
         let Bspline { drone, degree, start, knots, points, .. } = message;
+        let points: Vec<[f64; 3]> = points.into_iter().map(|Point { x, y, z }| [x, y, z]).collect();
         let Some(degree) = usize::try_from(degree).ok().filter(|degree| (1..=HIGHEST_DEGREE).contains(degree)) else {
             let problem = format!("order: must be 1 to {HIGHEST_DEGREE}, got {degree}");
             return refuse(ContentKind::Degree, problem, replan());
@@ -299,12 +280,11 @@ impl Plan {
         }
         let points: Vec<_> = points.into_iter().map(Vector3::from).collect();
         let parts = b_spline(degree, &knots, &points);
-        Ok((drone, Self { start_ns: start_ns(start)?, parts, is_held: true }))
+        Ok((drone, Self { start_ns: start_ns(&start)?, parts, is_held: true }))
     }
 
     /// Returns the drone and the curve of a message.
-    fn of_minco(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
-        let minco: MincoTraj = decoded(encoding, bytes)?;
+    fn of_minco(minco: &MincoTraj) -> Result<(i32, Self), Fault> {
         refuse_degree(minco.order)?;
         let durations = durations(&minco.durations)?;
         let pieces = durations.len();
@@ -317,25 +297,25 @@ impl Plan {
                 return refuse(ContentKind::FieldCount, problem, replan());
             }
         }
-        for (name, states) in [("start", &minco.start), ("end", &minco.end)] {
-            for (letter, numbers) in ["p", "v", "a"].into_iter().zip(states) {
-                refuse_not_finite(&format!("{name}_{letter}"), &wide(numbers))?;
-            }
+        let start = [("start_p", minco.start_p), ("start_v", minco.start_v), ("start_a", minco.start_a)];
+        let end = [("end_p", minco.end_p), ("end_v", minco.end_v), ("end_a", minco.end_a)];
+        for (name, numbers) in start.iter().chain(&end) {
+            refuse_not_finite(name, &wide(numbers))?;
         }
-        let state = |rows: [[f32; 3]; 3]| rows.map(|numbers| Vector3::from(numbers.map(f64::from)));
+        let state = |rows: [(&str, [f32; 3]); 3]| rows.map(|(_, numbers)| Vector3::from(numbers.map(f64::from)));
         let inner: Vec<_> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| Vector3::new(*x, *y, *z)).collect();
-        let parts = minimum_jerk(state(minco.start), &inner, state(minco.end), &durations);
-        let start_ns = start_ns(minco.start_time)?;
+        let parts = minimum_jerk(state(start), &inner, state(end), &durations);
+        let start_ns = start_ns(&minco.start_time)?;
         Ok((minco.drone.into(), Self { start_ns, parts, is_held: false }))
     }
 
     /// Returns the drone and the curve of a message.
-    fn of_polynomials(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
-        let PolyTraj { drone, start, order, x, y, z, durations: lengths, .. } = decoded(encoding, bytes)?;
-        refuse_degree(order)?;
-        let durations = durations(&lengths)?;
+    fn of_polynomials(message: &PolyTraj) -> Result<(i32, Self), Fault> {
+        let PolyTraj { drone, start, order, x, y, z, durations: lengths, .. } = message;
+        refuse_degree(*order)?;
+        let durations = durations(lengths)?;
         let (pieces, terms) = (durations.len(), usize::from(DEGREE) + 1);
-        let axes = [("coef_x", wide(&x)), ("coef_y", wide(&y)), ("coef_z", wide(&z))];
+        let axes = [("coef_x", wide(x)), ("coef_y", wide(y)), ("coef_z", wide(z))];
         for (name, numbers) in &axes {
             refuse_not_finite(name, numbers)?;
             if numbers.len() != terms * pieces {
@@ -352,12 +332,12 @@ impl Plan {
             from_s += duration_s;
         }
         let start_ns = start_ns(start)?;
-        Ok((drone.into(), Self { start_ns, parts, is_held: false }))
+        Ok(((*drone).into(), Self { start_ns, parts, is_held: false }))
     }
 }
 
 /// Returns the start of a curve \[ns\].
-fn start_ns((sec, nanosec): (i32, u32)) -> Result<i64, Fault> {
+fn start_ns(&Time { sec, nanosec }: &Time) -> Result<i64, Fault> {
     if i64::from(nanosec) < NS_PER_S {
         return Ok(nanoseconds(sec.into(), nanosec.into()));
     }
@@ -414,42 +394,178 @@ fn refuse_not_finite(name: &str, numbers: &[f64]) -> Result<(), Fault> {
     }
 }
 
-/// Message of EGO-Planner. The angles after the points are not read.
+/// Message of a planner.
+enum Message {
+    BSpline(Bspline),
+    BSplines(MultiBsplines),
+    Minco(MincoTraj),
+    Polynomials(PolyTraj),
+}
+
+impl Message {
+    /// Reads a message of a bag.
+    fn in_cdr(kind: CurveKind, topic: &DeclaredTopic, bytes: &[u8]) -> Result<Self, Fault> {
+        let encoding = &*topic.encoding;
+        match kind {
+            CurveKind::BSpline => decoded(encoding, bytes).map(Self::BSpline),
+            CurveKind::BSplines => decoded(encoding, bytes).map(Self::BSplines),
+            CurveKind::Minco => decoded(encoding, bytes).map(Self::Minco),
+            CurveKind::Polynomials => decoded(encoding, bytes).map(Self::Polynomials),
+            CurveKind::Unsupported => {
+                let found = fields(&topic.definition).replace('\n', ", ");
+                let problem = format!("the definition of {} has other fields: {found}", quoted(&topic.schema));
+                refuse(ContentKind::UnsupportedFormat, problem, replan())
+            }
+        }
+    }
+
+    /// Reads a message in JSON; `None` if its fields are those of no planner.
+    fn in_json(message: &Value) -> Option<serde_json::Result<Self>> {
+        let has = |field: &str| message.get(field).is_some();
+        if has("traj") && has("drone_id_from") {
+            Some(MultiBsplines::deserialize(message).map(Self::BSplines))
+        } else if has("knots") || has("pos_pts") {
+            Some(Bspline::deserialize(message).map(Self::BSpline))
+        } else if has("inner_x") || has("start_p") {
+            Some(MincoTraj::deserialize(message).map(Self::Minco))
+        } else if has("coef_x") {
+            Some(PolyTraj::deserialize(message).map(Self::Polynomials))
+        } else {
+            None
+        }
+    }
+
+    /// Returns the drones and their curves. A list of B-splines has elements without points for drones that have
+    /// published nothing.
+    fn plans(self) -> Result<Vec<(i32, Plan)>, Fault> {
+        match self {
+            Self::BSpline(message) => Ok(vec![Plan::of_b_spline(message)?]),
+            Self::BSplines(MultiBsplines { list, .. }) => {
+                let published = list.into_iter().filter(|spline| !(spline.points.is_empty() && spline.knots.is_empty()));
+                published.map(Plan::of_b_spline).collect()
+            }
+            Self::Minco(message) => Ok(vec![Plan::of_minco(&message)?]),
+            Self::Polynomials(message) => Ok(vec![Plan::of_polynomials(&message)?]),
+        }
+    }
+}
+
+/// Plan in a message of a live source.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LivePlan {
+    /// Number of the drone.
+    pub drone: i32,
+    /// Start since the epoch of the planner's clock \[ns\].
+    pub start_ns: i64,
+    /// Pieces in order of time, at least one. Their times count from the start of the plan, their vehicle is 0.
+    pub pieces: Vec<Piece>,
+    /// Whether the planner holds the last point after the end of the plan.
+    pub is_held: bool,
+}
+
+/// Returns the plans of a planner's message in JSON; `None` if its fields are those of no planner.
+///
+/// # Errors
+/// A sentence if a field is missing or wrong.
+#[must_use]
+pub fn live_plans(message: &Value) -> Option<Result<Vec<LivePlan>, String>> {
+    let plans = match Message::in_json(message)? {
+        Ok(message) => message.plans().map_err(|fault| fault.to_string()),
+        Err(error) => Err(error.to_string()),
+    };
+    let live = |(drone, Plan { start_ns, parts, is_held }): (i32, Plan)| {
+        let pieces = parts.into_iter().map(|(from_s, to_s, coefficients)| piece(0, from_s, to_s, coefficients, 1.0));
+        let pieces = pieces.collect::<Option<_>>().ok_or("a value exceeds the range of numbers")?;
+        Ok(LivePlan { drone, start_ns, pieces, is_held })
+    };
+    Some(plans.and_then(|plans| plans.into_iter().map(live).collect()))
+}
+
+/// Time since the epoch of a clock. ROS 1 has other names of the fields.
+#[derive(Deserialize)]
+struct Time {
+    #[serde(alias = "secs")]
+    sec: i32,
+    #[serde(alias = "nsecs")]
+    nanosec: u32,
+}
+
+#[derive(Deserialize)]
+struct Point {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+/// Message of EGO-Planner. The angles are not used.
 #[derive(Deserialize)]
 struct Bspline {
+    #[serde(rename = "drone_id")]
     drone: i32,
+    #[serde(rename = "order")]
     degree: i32,
+    #[serde(rename = "traj_id")]
     _traj_id: i64,
-    start: (i32, u32),
+    #[serde(rename = "start_time")]
+    start: Time,
     knots: Vec<f64>,
-    points: Vec<[f64; 3]>,
+    #[serde(rename = "pos_pts")]
+    points: Vec<Point>,
+    #[serde(rename = "yaw_pts")]
+    _yaw_points: Vec<f64>,
+    #[serde(rename = "yaw_dt")]
+    _yaw_interval_s: f64,
+}
+
+/// List of messages of EGO-Planner.
+#[derive(Deserialize)]
+struct MultiBsplines {
+    #[serde(rename = "drone_id_from")]
+    _from: i32,
+    #[serde(rename = "traj")]
+    list: Vec<Bspline>,
 }
 
 /// Message of EGO-Planner v2: positions, velocities and accelerations at both ends, inner points and durations.
 #[derive(Deserialize)]
 struct MincoTraj {
+    #[serde(rename = "drone_id")]
     drone: i16,
+    #[serde(rename = "traj_id")]
     _traj_id: i32,
-    start_time: (i32, u32),
+    start_time: Time,
+    #[serde(rename = "des_clearance")]
     _clearance_m: f32,
     order: u8,
-    start: [[f32; 3]; 3],
-    end: [[f32; 3]; 3],
+    start_p: [f32; 3],
+    start_v: [f32; 3],
+    start_a: [f32; 3],
+    end_p: [f32; 3],
+    end_v: [f32; 3],
+    end_a: [f32; 3],
     inner_x: Vec<f32>,
     inner_y: Vec<f32>,
     inner_z: Vec<f32>,
+    #[serde(rename = "duration")]
     durations: Vec<f32>,
 }
 
 /// Message of EGO-Planner v2: six coefficients of each piece, and durations.
 #[derive(Deserialize)]
 struct PolyTraj {
+    #[serde(rename = "drone_id")]
     drone: i16,
+    #[serde(rename = "traj_id")]
     _traj_id: i32,
-    start: (i32, u32),
+    #[serde(rename = "start_time")]
+    start: Time,
     order: u8,
+    #[serde(rename = "coef_x")]
     x: Vec<f32>,
+    #[serde(rename = "coef_y")]
     y: Vec<f32>,
+    #[serde(rename = "coef_z")]
     z: Vec<f32>,
+    #[serde(rename = "duration")]
     durations: Vec<f32>,
 }
