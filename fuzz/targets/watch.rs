@@ -49,6 +49,10 @@ fn judge(inputs: &[Input]) {
                 monitor.take(&pose.borrowed(), arrival_s);
             }
             Input::TwoStreams(id, _) => monitor.two_streams(id, arrival_s),
+            Input::Plan(message) => {
+                // A plan that cannot be used changes nothing.
+                let _ = monitor.take_plan(message);
+            }
             Input::SignOff(id, t_s, _) => has_sign_off |= monitor.sign_off(id, *t_s, arrival_s),
             _ => {}
         }

@@ -31,7 +31,7 @@ Sources:
   -                     Standard input. Each line is a JSON object with t, id, x, y, z, and vx, vy, vz if known.
                         A line with t, id and event, which is off, is the sign-off of a vehicle.
   mavlink:ADDRESS:PORT  MAVLink over UDP. The system id is the name of a vehicle.
-  rosbridge:HOST:PORT   Topics of ROS with positions or plans of planners, with --topic.
+  rosbridge:HOST:PORT   Topics of ROS, with --topic. Plans of planners are read, too.
   foxglove:HOST:PORT    Topics with positions of a Foxglove server, all or those of --topic.
 
 A line comes each second and at every change of state: CLEAR, UNDECIDED or VIOLATION. A watch ends with its input or
@@ -100,8 +100,7 @@ pub(super) struct WatchArguments {
     /// Largest deviation from the plan [m].
     #[arg(long, value_name = "METRES", default_value_t = 0.5, allow_negative_numbers = true, requires = "plan")]
     tube: f64,
-    /// What a drone does after the end of a plan that a planner publishes: hold the last point, continue with the last
-    /// velocity, or unknown, which is not judged [default: hold].
+    /// Motion after the end of a planner's plan. Unknown motion is not judged [default: hold].
     #[arg(long, value_name = "END", value_parser = plan_end())]
     plan_end: Option<PlanEnd>,
     /// Write the used positions to a .csv or .mcap file for `tautline audit`, as FILE.partial until the end.

@@ -29,6 +29,7 @@ NOT_RUN_HERE = {
     ("docs/export.md", "tautline watch mavlink:"): "listens until Ctrl-C",
     ("docs/watch.md", "tautline watch mavlink:"): "listens until Ctrl-C; crates/watch tests the source",
     ("docs/watch.md", "tautline watch rosbridge:"): "the same; tests/program/watch.rs runs it",
+    ("docs/planners.md", "tautline watch rosbridge:"): "the same; crates/watch tests the source",
     ("docs/watch.md", "tautline watch foxglove:"): "the same",
     ("docs/benchmarks.md", "tautline run"): "ten thousand and a hundred thousand vehicles: minutes, 0.4 GB of memory",
 }

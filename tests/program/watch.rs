@@ -430,6 +430,7 @@ fn wrong_options_end_with_code_2() {
         (&["rosbridge:localhost:9090", "--delta", "1"], "watch/source"),
         (&["foxglove:no such host", "--delta", "1"], "watch/source"),
         (&["mavlink:127.0.0.1:0", "--delta", "1", "--time", "stamps"], "watch/source"),
+        (&["--delta", "1", "--plan-end", "hold"], "watch/source"),
         (&["--delta", "1", "--record", "watch.txt"], "watch/record"),
         (&["--delta", "1", "--record", "folder.csv", "--force"], "watch/record"),
         (&["--delta", "1", "--record", "there.csv"], "watch/record"),

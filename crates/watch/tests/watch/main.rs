@@ -4,6 +4,7 @@ mod bounds;
 mod foxglove;
 mod input;
 mod past;
+mod plans;
 mod session;
 mod sign_off;
 mod simulation;

@@ -1,6 +1,6 @@
 //! Reads curves of planners: `traj_utils/msg/Bspline` and `traj_utils/msg/MultiBsplines` of EGO-Planner, and
-//! `traj_utils/msg/MINCOTraj` and `traj_utils/msg/PolyTraj` of its version 2. The definitions in the bag decide. JSON of
-//! a live source has no definitions: its fields decide.
+//! `traj_utils/msg/MINCOTraj` and `traj_utils/msg/PolyTraj` of its version 2. The definitions in the bag decide. In the
+//! JSON of a live source, which has no definitions, the fields decide.
 //!
 //! A curve of a drone is flown from its start until the next one of that drone starts. The whole curve is a published
 //! plan ([`Published`]). The trajectory server of the first version holds the last point of a curve. That of the second
@@ -441,7 +441,8 @@ impl Message {
         match self {
             Self::BSpline(message) => Ok(vec![Plan::of_b_spline(message)?]),
             Self::BSplines(MultiBsplines { list, .. }) => {
-                let published = list.into_iter().filter(|spline| !(spline.points.is_empty() && spline.knots.is_empty()));
+                let published =
+                    list.into_iter().filter(|spline| !(spline.points.is_empty() && spline.knots.is_empty()));
                 published.map(Plan::of_b_spline).collect()
             }
             Self::Minco(message) => Ok(vec![Plan::of_minco(&message)?]),
