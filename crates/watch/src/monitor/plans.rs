@@ -20,6 +20,7 @@ use tautline_recordings::read::LivePlan;
 
 /// Largest time between the arrival of a plan and its start \[s\].
 const LARGEST_LEAD_S: f64 = 60.0;
+const NS_PER_S: i64 = 1_000_000_000;
 /// Largest number of pieces of a plan.
 const MOST_PIECES: usize = 1000;
 /// Largest number of plans of a drone that are valid or start later.
@@ -45,6 +46,8 @@ pub(super) struct PublishedPlans {
     /// Whether each plan so far is of a planner that holds the last point.
     are_held: bool,
     clock: PlanClock,
+    /// Time of this machine since 1970 at time 0 \[ns\].
+    machine_ns: Option<i64>,
 }
 
 #[derive(Clone, Debug)]
@@ -69,7 +72,22 @@ impl PublishedPlans {
             counts: [0; 2],
             are_held: true,
             clock: PlanClock::Positions,
+            machine_ns: None,
         })
+    }
+
+    /// Returns a time of this machine since 1970 \[ns\] as a time of the caller's clock \[s\], by the times of an arrival
+    /// on both clocks.
+    ///
+    /// The arrivals are read one after the other, so that a delay makes their difference larger. The smallest one is
+    /// kept until the clock of this machine steps.
+    fn of_machine_s(&mut self, time_ns: i64, arrival_ns: i64, arrival_s: f64) -> f64 {
+        #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
+        let seen_ns = arrival_ns.saturating_sub((arrival_s * 1e9).round() as i64);
+        let is_delay = |known_ns: &i64| (0..NS_PER_S).contains(&seen_ns.saturating_sub(*known_ns));
+        let zero_ns = self.machine_ns.filter(is_delay).unwrap_or(seen_ns);
+        self.machine_ns = Some(zero_ns);
+        time_ns.saturating_sub(zero_ns) as f64 * 1e-9
     }
 
     /// Returns whether the plan was published before. A repetition is no new publication.
@@ -151,10 +169,6 @@ impl Monitor {
         if plan.pieces.len() > MOST_PIECES {
             return Err(wrong(format!("it has {} pieces, more than {MOST_PIECES}", plan.pieces.len())));
         }
-        let (start_s, clock) = match self.clock {
-            Some(clock) => (clock.time_of(plan.start_ns as f64 * 1e-9) - self.shift_s, PlanClock::Positions),
-            None => (now_s + plan.start_ns.saturating_sub(*arrival_ns) as f64 * 1e-9, PlanClock::Machine),
-        };
         let end = self.settings.plan_end.unwrap_or(PlanEnd::Hold);
         let plans = match &mut self.plans {
             Some(plans) => plans,
@@ -163,6 +177,10 @@ impl Monitor {
         if plans.is_repeated(plan)? {
             return Ok(());
         }
+        let (start_s, clock) = match self.clock {
+            Some(clock) => (clock.time_of(plan.start_ns as f64 * 1e-9) - self.shift_s, PlanClock::Positions),
+            None => (plans.of_machine_s(plan.start_ns, *arrival_ns, now_s), PlanClock::Machine),
+        };
         if (start_s - now_s).abs() > LARGEST_LEAD_S {
             return Err(Problem::OtherPlanClock(start_s - now_s, clock));
         }

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use nalgebra::Vector3;
 use serde_json::{Value, json};
 use tautline_core::fact::FactKind;
 use tautline_recordings::read::{LivePlan, live_plans};
@@ -156,7 +155,9 @@ fn a_conflict_before_the_next_plan_starts_is_not_withdrawn() {
     take(&mut monitor, plan(1, 4.2, [0.0, 40.0, 1.0], [0.0; 3], 1.0), 0.9).expect("a plan");
     let State::Undecided(Reason::PlanConflict(left)) = heard(&mut monitor, 1.0) else { panic!("a conflict") };
     assert!((left.to_s - EPOCH_S as f64 - 4.2).abs() < 1e-5, "{left:?}");
-    (11..43).for_each(|tenth| drop(heard(&mut monitor, f64::from(tenth) / 10.0)));
+    for tenth in 11..43 {
+        heard(&mut monitor, f64::from(tenth) / 10.0);
+    }
     assert_eq!(heard(&mut monitor, 4.3), State::Clear);
 }
 
@@ -271,7 +272,7 @@ fn plans_come_through_rosbridge() {
     let found = notices.iter().find(|notice| notice["event"] == "plan-conflict").expect("a conflict");
     assert_eq!((&found["plan"]["vehicle"], &found["other"]["vehicle"]), (&json!("1"), &json!("0")), "{found}");
     assert!(found["left_s"].as_f64().is_some_and(|left_s| left_s > 2.0 && left_s < 4.5), "{found}");
-    assert!(found["min_m"].as_f64().is_some_and(|min_m| min_m < 1e-6), "{found}");
+    assert!(found["min_m"].as_f64().is_some_and(|min_m| min_m < 1e-3), "{found}");
     assert_eq!(notices.last().expect("a summary")["plans"], json!({ "count": 2, "conflicts": 1 }));
     // A malformed plan is an error of the input.
     let mut spoiled = first;
