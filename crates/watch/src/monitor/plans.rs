@@ -76,8 +76,8 @@ impl PublishedPlans {
         })
     }
 
-    /// Returns a time of this machine since 1970 \[ns\] as a time of the caller's clock \[s\], by the times of an arrival
-    /// on both clocks.
+    /// Returns a time of this machine since 1970 \[ns\] as a time of the caller's clock \[s\]. The times of an arrival on
+    /// both clocks give their offset.
     ///
     /// The arrivals are read one after the other, so that a delay makes their difference larger. The smallest one is
     /// kept until the clock of this machine steps.

@@ -9,7 +9,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use nalgebra::Vector3;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
-use tautline_watch::source::{Input, OwnedPose, channel};
+use tautline_core::track::Piece;
+use tautline_recordings::read::LivePlan;
+use tautline_watch::source::{Input, OwnedPose, PlanMessage, channel};
 use tautline_watch::{Bound, MessageError, Monitor, Notice, Output, Plan, Pose, Problem, Settings, TimeBase, watch};
 
 #[global_allocator]
@@ -44,6 +46,15 @@ fn rounds_allocate_nothing() {
     for k in 0..200 {
         round(&mut monitor, &ids, k);
     }
+    // Two plans in conflict over all rounds.
+    for drone in 0..2 {
+        let piece = Piece { vehicle: 0, from_s: 0.0, to_s: 100.0, coefficients: vec![Vector3::zeros()] };
+        let plan = LivePlan { drone, start_ns: 4_000_000_000, pieces: vec![piece], is_held: true };
+        let message = PlanMessage { topic: String::new(), plan, arrival_s: 3.98, arrival_ns: 0 };
+        monitor.take_plan(&message).expect("a plan");
+    }
+    monitor.drain_events();
+    assert_eq!(monitor.plan_counts(), Some([2, 1]));
     let before = monitor.violations();
     let region = Region::new(ALLOCATOR);
     for k in 200..2000 {
