@@ -267,10 +267,10 @@ impl Session<'_> {
 
     fn assess(&mut self, arrival_s: f64) -> io::Result<()> {
         let of = self.monitor.assess(arrival_s);
-        self.judged(of)
+        self.judged(&of)
     }
 
-    fn judged(&mut self, of: Assessment) -> io::Result<()> {
+    fn judged(&mut self, of: &Assessment) -> io::Result<()> {
         self.pass_events()?;
         if let Some(notice) = self.held.take() {
             self.output.notice(&notice)?;
@@ -319,15 +319,15 @@ impl Session<'_> {
         let is_due = of.now_s >= self.line_s + LINE_PERIOD_S || of.now_s < self.line_s;
         if is_change || is_due {
             self.line_s = of.now_s;
-            let notice = Notice::new(Statement::State(&of), &self.monitor);
+            let notice = Notice::new(Statement::State(of), &self.monitor);
             if self.holds {
                 self.held = Some(notice);
             } else {
                 self.output.notice(&notice)?;
             }
         }
-        self.last = Some(of);
-        self.output.assessed(&of, &self.monitor)
+        self.last = Some(*of);
+        self.output.assessed(of, &self.monitor)
     }
 
     fn pass_events(&mut self) -> io::Result<()> {
@@ -357,7 +357,7 @@ impl Session<'_> {
 
     fn finish(mut self, arrival_s: f64) -> io::Result<Summary> {
         let of = self.monitor.finish(arrival_s);
-        self.judged(of)?;
+        self.judged(&of)?;
         self.summary.violations = self.monitor.violations();
         self.summary.compared = self.monitor.compared();
         self.summary.plans = self.monitor.plan_counts();

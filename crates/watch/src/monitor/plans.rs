@@ -62,7 +62,7 @@ struct Drone {
 
 impl PublishedPlans {
     fn new(delta_m: f64, end: PlanEnd) -> Result<Self, Problem> {
-        let auditor = PlanAuditor::new(recorded::Settings::delta(delta_m), end).map_err(wrong)?;
+        let auditor = PlanAuditor::new(recorded::Settings::delta(delta_m), end).map_err(|error| wrong(&error))?;
         Ok(Self {
             auditor,
             names: Vec::new(),
@@ -76,8 +76,8 @@ impl PublishedPlans {
         })
     }
 
-    /// Returns a time of this machine since 1970 \[ns\] as a time of the caller's clock \[s\]. The times of an arrival on
-    /// both clocks give their offset.
+    /// Returns a time of this machine since 1970 \[ns\] as a time of the caller's clock \[s\]. The times of an arrival
+    /// on both clocks give their offset.
     ///
     /// The arrivals are read one after the other, so that a delay makes their difference larger. The smallest one is
     /// kept until the clock of this machine steps.
@@ -96,7 +96,7 @@ impl PublishedPlans {
         match seen.into_iter().flatten().find(|(start_ns, _)| *start_ns == plan.start_ns) {
             None => Ok(false),
             Some((_, known)) if *known == digest(plan) => Ok(true),
-            Some(_) => Err(wrong(format!("another plan of drone {} starts at {} ns", plan.drone, plan.start_ns))),
+            Some(_) => Err(wrong(&format!("another plan of drone {} starts at {} ns", plan.drone, plan.start_ns))),
         }
     }
 
@@ -114,7 +114,7 @@ impl PublishedPlans {
         let over = drone.starts_s.partition_point(|other_s| *other_s <= published_s).saturating_sub(1);
         drone.starts_s.drain(..over);
         if drone.starts_s.partition_point(|other_s| *other_s < start_s) >= MOST_VALID {
-            return Err(wrong(format!("drone {} has {MOST_VALID} plans that start before it", plan.drone)));
+            return Err(wrong(&format!("drone {} has {MOST_VALID} plans that start before it", plan.drone)));
         }
         let pieces = plan.pieces.iter().map(|piece| Piece {
             vehicle: index,
@@ -123,7 +123,7 @@ impl PublishedPlans {
             coefficients: piece.coefficients.clone(),
         });
         let published = Plan { vehicle: index, published_s, pieces: pieces.collect() };
-        let found = self.auditor.push(&self.names, &published).map_err(wrong)?;
+        let found = self.auditor.push(&self.names, &published).map_err(|error| wrong(&error))?;
         drone.starts_s.retain(|other_s| *other_s < start_s);
         drone.starts_s.push(start_s);
         if drone.seen.len() == MOST_SEEN {
@@ -167,7 +167,7 @@ impl Monitor {
             TimeBase::Stamps => *arrival_s,
         };
         if plan.pieces.len() > MOST_PIECES {
-            return Err(wrong(format!("it has {} pieces, more than {MOST_PIECES}", plan.pieces.len())));
+            return Err(wrong(&format!("it has {} pieces, more than {MOST_PIECES}", plan.pieces.len())));
         }
         let end = self.settings.plan_end.unwrap_or(PlanEnd::Hold);
         let plans = match &mut self.plans {
@@ -268,6 +268,6 @@ fn digest(plan: &LivePlan) -> u64 {
     hasher.finish()
 }
 
-fn wrong(why: impl ToString) -> Problem {
+fn wrong(why: &impl ToString) -> Problem {
     Problem::WrongPlan(why.to_string())
 }

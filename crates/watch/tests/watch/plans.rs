@@ -31,6 +31,7 @@ fn line(drone: i32, start_ns: i64, from_m: [f64; 3], velocity_m_s: [f64; 3], dur
     })
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "times of tests are small")]
 fn nanoseconds(start_s: f64) -> i64 {
     EPOCH_S * NS_PER_S + (start_s * 1e9).round() as i64
 }
