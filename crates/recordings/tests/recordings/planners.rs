@@ -380,6 +380,9 @@ fn json_of_a_live_source_has_the_plans_of_the_same_messages_in_a_bag() {
     }
 }
 
+/// Valid message, path of a wrong value, the value, and the problem.
+type JsonSpoil = (fn() -> Value, &'static str, Value, &'static str);
+
 #[test]
 fn wrong_fields_in_json_are_errors() {
     let list = json!({ "drone_id_from": 1, "traj": [spline_in_json(4)] });
@@ -403,8 +406,7 @@ fn wrong_fields_in_json_are_errors() {
         }
     }
     assert_eq!(all, 5 * (8 + 15 + 8 + 2));
-    type Spoil = (fn() -> Value, &'static str, Value, &'static str);
-    let spoils: [Spoil; 8] = [
+    let spoils: [JsonSpoil; 8] = [
         (|| spline_in_json(4), "/order", json!(16), "order: must be 1 to 15, got 16"),
         (|| spline_in_json(4), "/start_time/nanosec", json!(1_000_000_000), "start_time.nanosec: must be below"),
         (|| spline_in_json(4), "/pos_pts/1/x", json!(null), "invalid type: null"),
