@@ -323,8 +323,18 @@ mod tests {
     ];
 
     /// Options of readers that the recording of the test does not allow. None of them is a part of the question.
-    const READING: [&str; 9] =
-        ["one-vehicle", "dimensions", "start", "layout", "frame", "topic", "origin", "allow-unfinished", "clock"];
+    const READING: [&str; 10] = [
+        "one-vehicle",
+        "dimensions",
+        "start",
+        "layout",
+        "frame",
+        "topic",
+        "origin",
+        "plan-end",
+        "allow-unfinished",
+        "clock",
+    ];
 
     #[test]
     fn every_option_that_depends_on_seconds_is_refused_with_a_guessed_unit() {

@@ -11,7 +11,7 @@ use super::console::{Console, Terminal};
 use super::reading::ReadArguments;
 use super::{Exit, completions, drawing};
 use tautline_core::files::{write_atomically, write_atomically_with};
-use tautline_core::option::{self, FILM_FPS};
+use tautline_core::option::FILM_FPS;
 use tautline_core::swarm::Pair;
 use tautline_render::{
     CameraSpec, Colouring, Extent, Film, FilmFormat, Layers, Picture, RenderError, Renderer, Scene, Theme, Timeline,
@@ -133,9 +133,10 @@ struct Sheet {
     size_px: [u32; 2],
 }
 
-/// Adds the option for the rate of a film to a failure that concerns the frame rate of the recording.
+/// Adds the option for the rate of a film to the failure of a recording that is read with a frame rate.
 fn about_film_rate(failure: Failure) -> Failure {
-    match failure.help().filter(|help| help.contains(&option::FPS.to_string())) {
+    let help = failure.help().filter(|_| failure.code().starts_with("recording/"));
+    match help {
         Some(help) => failure.clone().with_help(format!("{help}; {FILM_FPS} sets the rate of a film")),
         None => failure,
     }
@@ -158,8 +159,10 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let reading = arguments.reading.options();
     let recording = arguments.reading.only("drawn")?;
     let paths: Vec<&Path> = std::iter::once(recording).chain(arguments.beside.as_deref()).collect();
+    let may_mean_film = film.is_some() && reading.times_per_second.is_some();
     let read = |path: &&Path| {
-        drawing::flight(&recording_in(path), &reading, arguments.delta, console).map_err(about_film_rate)
+        let flight = drawing::flight(&recording_in(path), &reading, arguments.delta, console);
+        flight.map_err(|failure| if may_mean_film { about_film_rate(failure) } else { failure })
     };
     let flights = paths.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     let timeline = &flights[0];

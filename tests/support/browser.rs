@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 
 /// Time limit of a browser; a page loads in a second or two.
 const PATIENCE: Duration = Duration::from_mins(2);
-/// Flags for WebGL without a graphics card.
+/// Flags that draw WebGL on the processor.
+pub(crate) const WITH_WEBGL: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+/// Flags of a browser without WebGL.
 pub(crate) const WITHOUT_WEBGL: [&str; 2] = ["--disable-gpu", "--disable-3d-apis"];
 const WIDTHS_PX: [u32; 3] = [320, 390, 1280];
 /// Smallest contrast of text for readers with moderately low vision (WCAG 2.2, level AA).
@@ -71,11 +73,11 @@ pub(crate) struct LivePage {
 }
 
 impl LivePage {
-    /// Opens an address in a new browser without WebGL.
+    /// Opens an address in a new browser, which draws on the processor.
     pub(crate) fn open(folder: &Path, url: &str) -> Self {
         let mut browser = Command::new(self::browser())
             .args(["--headless", "--no-sandbox", "--no-first-run", "--remote-debugging-port=0"])
-            .args(WITHOUT_WEBGL)
+            .args(WITH_WEBGL)
             .args(["--disable-background-networking", "--disable-component-update", "--disable-dev-shm-usage"])
             .arg(format!("--user-data-dir={}", folder.join("live-browser").display()))
             .arg(url)

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::browser::open;
+use crate::browser::{WITH_WEBGL, open};
 
 /// Opens a page in a frame of the given width and runs a script in it. Returns the value of the script and the output
 /// of the browser's console.
@@ -11,8 +11,7 @@ use crate::browser::open;
 /// The script has the variables `win` and `doc` of the page, its first replay `root`, the `player` of this replay, and
 /// `key(name)`, which presses a key and draws at once.
 pub(crate) fn steer(folder: &Path, page: &Path, look: (u32, bool), script: &str) -> (serde_json::Value, Vec<String>) {
-    // Software rendering.
-    steer_with(folder, page, look, &["--use-angle=swiftshader", "--enable-unsafe-swiftshader"], script)
+    steer_with(folder, page, look, &WITH_WEBGL, script)
 }
 
 /// Does the same as [`steer`] in a browser with these flags.
