@@ -10,7 +10,8 @@ use tautline::audit::Status;
 use tautline::audit::recorded::{PlanAuditor, PlansOutcome, Settings};
 use tautline::track::{Piece, Plan, PlanEnd};
 
-const DURATION_S: f64 = 10.0;
+/// Plans of each vehicle: 10 s.
+const ROUNDS: u32 = 100;
 const RATE_HZ: f64 = 10.0;
 const PIECES: usize = 4;
 /// Limit that the vehicles keep \[m\].
@@ -49,16 +50,15 @@ fn piece(vehicle: usize, from_s: f64) -> Piece {
 }
 
 fn plans(vehicles: usize) -> Vec<Plan> {
-    let rounds = (DURATION_S * RATE_HZ) as usize;
-    let of_round = |round: usize| {
+    let of_round = |round: u32| {
         // Vehicles publish one after the other within a period.
         (0..vehicles).map(move |vehicle| {
-            let published_s = (round as f64 + vehicle as f64 / vehicles as f64) / RATE_HZ;
+            let published_s = (f64::from(round) + vehicle as f64 / vehicles as f64) / RATE_HZ;
             let pieces = (0..PIECES).map(|k| piece(vehicle, published_s + k as f64)).collect();
             Plan { vehicle, published_s, pieces }
         })
     };
-    (0..rounds).flat_map(of_round).collect()
+    (0..ROUNDS).flat_map(of_round).collect()
 }
 
 fn judged(names: &[String], plans: &[Plan], delta_m: f64) -> PlansOutcome {

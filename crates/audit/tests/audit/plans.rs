@@ -39,8 +39,10 @@ fn judged(end: PlanEnd, plans: &[Plan]) -> PlansOutcome {
     auditor.finish()
 }
 
-/// Returns the later and the earlier plan of each violation, as vehicle and number, and its closest instant.
-fn violations(outcome: &PlansOutcome) -> Vec<((usize, u64), (usize, u64), f64)> {
+/// Later and earlier plan of a violation, as vehicle and number, and its closest instant \[s\].
+type Found = ((usize, u64), (usize, u64), f64);
+
+fn violations(outcome: &PlansOutcome) -> Vec<Found> {
     let reference = |plan: tautline_audit::recorded::PlanReference| (plan.vehicle, plan.number);
     let found = outcome.violations.iter();
     found.map(|found| (reference(found.plan), reference(found.other), found.min_at_s.expect("an instant"))).collect()

@@ -497,8 +497,11 @@ fn wrong_bezier_tables_name_line_and_value() {
     assert_refused(&error, "recording/no-header", "line 1");
 }
 
-/// Returns the instant of publication, the vehicle, and start and end of each plan, and the clauses of assumptions.
-fn plans(bytes: &[u8]) -> (Vec<(f64, String, f64, f64)>, Vec<String>) {
+/// Instant of publication, vehicle, and start and end of a plan.
+type Published = (f64, String, f64, f64);
+
+/// Returns the plans of a recording, and the clauses of its assumptions.
+fn plans(bytes: &[u8]) -> (Vec<Published>, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plan.mcap");
     fs::write(&path, bytes).expect("written");

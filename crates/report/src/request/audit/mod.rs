@@ -15,6 +15,7 @@ mod subject;
 mod toml_file;
 mod venue_file;
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
@@ -290,7 +291,7 @@ impl ConfiguredAudit<'_> {
                 let files = figure_files(&figures, &request.formats);
                 write_files(&folder, &names.collect::<Vec<_>>(), &files)?;
                 let count = counted(files.len() as u64, "figure", "figures");
-                written += &format!(" and {count} in {}", folder.display());
+                let _ = write!(written, " and {count} in {}", folder.display());
             }
             monitor.say(&format!("wrote {written}"));
         }
