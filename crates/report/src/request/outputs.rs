@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Component, Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde_json::Value;
 use tautline_core::fact::Coded;
@@ -252,7 +253,10 @@ fn was_interrupted(report: &Path) -> bool {
 /// # Errors
 /// The error of the system.
 pub fn try_to_write_in(folder: &Path) -> io::Result<()> {
-    let probe = folder.join(format!(".tautline-{}", std::process::id()));
+    // Threads of a program may write into one folder.
+    static NUMBER: AtomicU64 = AtomicU64::new(0);
+    let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+    let probe = folder.join(format!(".tautline-{}-{number}", std::process::id()));
     fs::create_dir_all(folder).and_then(|()| File::create(&probe)).and_then(|_| fs::remove_file(&probe))
 }
 
