@@ -72,7 +72,7 @@ fn judged(names: &[String], plans: &[Plan], delta_m: f64) -> PlansOutcome {
 fn bench(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("plans");
     group.sample_size(10);
-    for vehicles in [10, 100] {
+    for vehicles in [20, 100] {
         let names: Vec<_> = (0..vehicles).map(|vehicle| vehicle.to_string()).collect();
         let plans = plans(vehicles);
         for (name, delta_m, status) in [("clear", DELTA_M, Status::Clear), ("violation", TOO_MUCH_M, Status::Violation)]
