@@ -66,7 +66,7 @@ fn judged(names: &[String], plans: &[Plan], delta_m: f64) -> PlansOutcome {
     for plan in plans {
         auditor.push(names, plan).expect("a plan");
     }
-    auditor.finish()
+    auditor.finish().expect("an outcome")
 }
 
 fn bench(criterion: &mut Criterion) {
@@ -77,7 +77,7 @@ fn bench(criterion: &mut Criterion) {
         let plans = plans(vehicles);
         for (name, delta_m, status) in [("clear", DELTA_M, Status::Clear), ("violation", TOO_MUCH_M, Status::Violation)]
         {
-            assert_eq!(judged(&names, &plans, delta_m).status, status);
+            assert_eq!(judged(&names, &plans, delta_m).published.status, status);
             group.bench_function(BenchmarkId::new(name, vehicles), |bencher| {
                 bencher.iter(|| black_box(judged(&names, &plans, delta_m)));
             });

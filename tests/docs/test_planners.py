@@ -51,6 +51,17 @@ def on_spline(points: list[planners.Point], interval_s: float, time_s: float) ->
     return tuple(sum(weight * point[axis] / 6 for weight, point in zip(weights, near)) for axis in range(3))
 
 
+def pose(topic: str, time_s: float, position: planners.Point) -> planners.Message:
+    """Returns a stamped pose."""
+    cdr = planners.Cdr()
+    cdr.time(planners.nanoseconds(time_s))
+    cdr.add("I", 4)
+    cdr.bytes += b"map\0"
+    cdr.add("d", *position, 0.0, 0.0, 0.0, 1.0)
+    schema = "geometry_msgs/msg/PoseStamped"
+    return planners.Message(topic, schema, "", planners.nanoseconds(time_s), cdr.message())
+
+
 class Planners(unittest.TestCase):
     def test_the_script_writes_the_recordings(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
@@ -85,6 +96,31 @@ class Planners(unittest.TestCase):
         self.assertEqual(planners.unchecked(0.0), curves)
         places = ([on_spline(points, 0.3, k / 33) for points in (first, second)] for k in range(int(1.5 * 33)))
         self.assertGreater(min(math.dist(*pair) for pair in places), DELTA_M["unchecked"])
+
+    def test_plans_are_judged_against_flights_too(self) -> None:
+        plan = planners.spline(0, 0.0, 0.5, [(k * 0.5, 0.0, 1.0) for k in range(20)], "/drone_0_planning/bspline")
+        for aside_m, expected in ((0.2, "violation"), (1.0, "clear")):
+            flights = {0: lambda time_s: (0.5 + time_s, 0.1, 1.0), 1: lambda _: (4.0, 0.1 + aside_m, 1.0)}
+            messages = [plan] + [
+                pose(f"/drone_{drone}/pose", k / 10, position(k / 10))
+                for k in range(85)
+                for drone, position in flights.items()
+            ]
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "flight.mcap"
+                path.write_bytes(planners.mcap(messages))
+                command = [TAUTLINE, "audit", path, "--delta", "0.5", "--json"]
+                ran = subprocess.run(command, capture_output=True, text=True, check=False)
+            report = json.loads(ran.stdout)
+            answers = {answer["part"]: answer for answer in report["answers"]}
+            self.assertEqual(set(answers), {"separation", "flown_plans"})
+            self.assertEqual((answers["flown_plans"]["status"], report["status"]), (expected, expected))
+            closest = answers["flown_plans"]["closest"][0]
+            self.assertEqual((closest["subjects"], len(closest["plans"])), (["/drone_0/pose", "/drone_1/pose"], 1))
+            self.assertAlmostEqual(closest["value"]["lower"], 0.1 + aside_m, places=6)
+            facts = {fact["fact"]: fact for fact in report["facts"]}
+            self.assertAlmostEqual(facts["tracking-error"]["value"], 0.1, places=6)
+            self.assertEqual((facts["flown-plans"]["source"], report["proved"]), ("inferred", False))
 
     def test_a_declared_end_proves_and_a_default_does_not(self) -> None:
         _, by_default = audited("last-third-mended")

@@ -128,6 +128,8 @@ coded! {
         PlanEnd = "plan-end",
         /// Instants at which plans are published.
         PlanPublication = "plan-publication",
+        /// Which plan is that of which recorded flight.
+        FlownPlans = "flown-plans",
         /// Accelerations are means over windows.
         MeanAcceleration = "mean-acceleration",
         /// Accelerations are those of the parabolas through three samples in a row.
@@ -269,6 +271,7 @@ impl Fact {
             // A recording with latitudes and longitudes may have heights in feet.
             FactKind::HeightUnit | FactKind::PlanEnd | FactKind::PlanPublication => self.source == Source::Default,
             FactKind::CommonStart
+            | FactKind::FlownPlans
             | FactKind::GpsClocks
             | FactKind::LogTimes
             | FactKind::UniformTransforms
@@ -336,6 +339,7 @@ impl fmt::Display for Fact {
                 }
             ),
             FactKind::PlanPublication => write!(out, "plans are published at {value}"),
+            FactKind::FlownPlans => write!(out, "plans have the frame and the clock of the positions, and {value}"),
             FactKind::MeanAcceleration => write!(out, "accelerations are means over {value}"),
             FactKind::SampledAcceleration => {
                 out.write_str("accelerations are those of the parabolas through three samples in a row")

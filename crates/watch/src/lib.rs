@@ -47,7 +47,7 @@ pub use session::{ASSESS_PERIOD_S, LINE_PERIOD_S, Output, Summary, watch};
 pub use settings::{
     Bound, ClockScope, DEFAULT_ACCEL_M_S2, Expected, REPORTED_DEVIATIONS, Settings, SettingsError, TimeBase,
 };
-pub use tautline_audit::recorded::{PlanConflict, PlanReference};
+pub use tautline_audit::recorded::{Counterpart, PlanConflict, PlanReference};
 pub use tautline_audit::{Status, Violation};
 pub use tautline_core::track::PlanEnd;
 pub use violations::MOST_OPEN;

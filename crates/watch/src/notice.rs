@@ -6,7 +6,7 @@ use crate::event::{Assessment, Event, Fault, Loss, MessageError, Pair, PairTime,
 use crate::monitor::Monitor;
 use crate::session::Summary;
 use crate::words::{self, Subject, name, sentence};
-use tautline_audit::recorded::PlanReference;
+use tautline_audit::recorded::Counterpart;
 use tautline_audit::{Status, Violation};
 use tautline_core::fact::Coded;
 use tautline_core::impl_coded;
@@ -105,7 +105,7 @@ impl<'a> Statement<'a> {
                     json!({ "vehicle": name(vehicle), "deviation_m": deviation_m, "outside": is_outside })
                 }
                 Event::PlanConflict { conflict, left_s, .. } => json!({
-                    "plan": planned(conflict.plan, monitor),
+                    "plan": planned(Counterpart::Plan(conflict.plan), monitor),
                     "other": planned(conflict.other, monitor),
                     "from_s": conflict.from_s,
                     "to_s": conflict.to_s,
@@ -225,8 +225,10 @@ fn finding(of: &Violation<Pair>, monitor: &Monitor) -> Value {
 }
 
 /// Returns a plan of a planner.
-fn planned(plan: PlanReference, monitor: &Monitor) -> Value {
-    json!({ "vehicle": monitor.drone(plan.vehicle), "number": plan.number, "published_s": plan.published_s })
+fn planned(motion: Counterpart, monitor: &Monitor) -> Value {
+    let plan = motion.plan();
+    let (number, published_s) = (plan.map(|plan| plan.number), plan.map(|plan| plan.published_s));
+    json!({ "vehicle": monitor.drone(motion.vehicle()), "number": number, "published_s": published_s })
 }
 
 /// Returns the data of a cause, whose keys depend on its code.
@@ -244,7 +246,7 @@ fn cause_data(cause: Subject<'_>, monitor: &Monitor) -> Value {
             Reason::Fault(fault, vehicle) => json!({ "fault": fault, "vehicle": vehicle.map(name) }),
             Reason::Uncertain(pair, least_m) => json!({ "subjects": pair.map(name), "least_m": least_m }),
             Reason::PlanConflict(conflict) => json!({
-                "plan": planned(conflict.plan, monitor),
+                "plan": planned(Counterpart::Plan(conflict.plan), monitor),
                 "other": planned(conflict.other, monitor),
                 "from_s": conflict.from_s,
                 "to_s": conflict.to_s,

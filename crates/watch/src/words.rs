@@ -6,7 +6,7 @@ use crate::notice::Statement;
 use crate::session::Summary;
 use crate::settings::REPORTED_DEVIATIONS;
 use tautline_audit::Status;
-use tautline_audit::recorded::{PlanConflict, PlanReference};
+use tautline_audit::recorded::{Counterpart, PlanConflict};
 use tautline_core::fact::{Coded as _, Fact, FactKind, FactValue, Source};
 use tautline_core::option::{ACCEL, FRAME, MAX_VEHICLES, ORIGIN, POSITION_ERROR, TOPIC};
 use tautline_core::text::{at_least, at_most, counted, in_order, seconds};
@@ -157,17 +157,18 @@ fn event(event: &Event, cause: Option<Subject<'_>>, monitor: &Monitor) -> String
 
 /// Returns the sentence of a conflict of two plans that begins in `left_s` \[s\].
 fn plan_conflict(conflict: &PlanConflict, left_s: f64, monitor: &Monitor) -> String {
-    let [plan, other] = [conflict.plan, conflict.other].map(|plan| {
-        let published = seconds(plan.published_s);
-        format!("{} (published at {published})", planned(plan, monitor))
+    let [plan, other] = [Counterpart::Plan(conflict.plan), conflict.other].map(|motion| {
+        let published = motion.plan().map(|plan| format!(" (published at {})", seconds(plan.published_s)));
+        planned(motion, monitor) + &published.unwrap_or_default()
     });
     let min_at = conflict.min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
     let min_m = at_least(conflict.lower_m, 2);
     let facts = monitor.plan_facts();
     let end = facts.iter().find(|fact| fact.kind == FactKind::PlanEnd);
     let end = end.map_or_else(String::new, |end| format!("; {end} ({})", end.source.code()));
+    let may = if conflict.min_at_s.is_none() { "may " } else { "" };
     format!(
-        "{plan} and {other} come to {min_m} m{min_at} (delta {} m): closer than delta from {} to {}, in {} s{end}",
+        "{plan} and {other} {may}come to {min_m} m{min_at} (delta {} m): closer than delta from {} to {}, in {} s{end}",
         conflict.limit_m,
         seconds(conflict.from_s),
         seconds(conflict.to_s),
@@ -175,8 +176,11 @@ fn plan_conflict(conflict: &PlanConflict, left_s: f64, monitor: &Monitor) -> Str
     )
 }
 
-fn planned(plan: PlanReference, monitor: &Monitor) -> String {
-    format!("plan {} of drone {}", plan.number, monitor.drone(plan.vehicle))
+fn planned(motion: Counterpart, monitor: &Monitor) -> String {
+    let drone = monitor.drone(motion.vehicle());
+    motion
+        .plan()
+        .map_or_else(|| format!("the flight of drone {drone}"), |plan| format!("plan {} of drone {drone}", plan.number))
 }
 
 /// Returns the clock of the starts of plans.
@@ -220,9 +224,10 @@ fn reason(reason: Reason, monitor: &Monitor) -> String {
             monitor.settings().delta_m
         ),
         Reason::PlanConflict(of) => format!(
-            "{} and {} are closer than delta from {} to {}",
-            planned(of.plan, monitor),
+            "{} and {} {} closer than delta from {} to {}",
+            planned(Counterpart::Plan(of.plan), monitor),
             planned(of.other, monitor),
+            if of.min_at_s.is_none() { "may be" } else { "are" },
             seconds(of.from_s),
             seconds(of.to_s)
         ),

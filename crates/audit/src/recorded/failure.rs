@@ -3,7 +3,7 @@
 use tautline_core::failure::Failure;
 use tautline_core::option::{
     ABOVE, ACCEL_WINDOW, CYLINDER, DELTA, ELLIPSOID, FENCE, FROM, IDS, LAND_ON, LIMIT, MAX_ACCEL, MOTION, OFFSET,
-    RADIUS, TIME_SCALE, UNTIL, WELL_CLEAR,
+    RADIUS, TIME_SCALE, TOPIC, UNTIL, WELL_CLEAR,
 };
 
 use super::RecordedError;
@@ -71,6 +71,10 @@ impl From<RecordedError> for Failure {
             RecordedError::RadiusChanges { .. } => {
                 let help = format!("give one radius of the vehicle with {}", RADIUS.set("NAME=R"));
                 ("audit/radius-changes", message, help)
+            }
+            RecordedError::ExchangedFlights { .. } => {
+                let help = format!("judge plans and positions apart with {}", TOPIC.set("NAME"));
+                ("audit/exchanged-flights", message, help)
             }
             RecordedError::ObstaclesAndEllipsoid => {
                 let help = format!("judge obstacles by {DELTA} or {RADIUS}, and ellipsoids without them");

@@ -41,8 +41,10 @@
 
 mod auditor;
 mod failure;
+mod flights;
 mod outcome;
 mod plan;
+mod plan_sweep;
 mod plans;
 mod second_pass;
 mod settings;
@@ -55,7 +57,9 @@ pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use outcome::{Absence, Contradiction, ExemptTime, Gap, Outcome, Presence, Tallies};
 pub use plan::{Deviation as PlanDeviation, PlanComparison, PlanFindings, Unknown as PlanUnknown};
-pub use plans::{PlanApproach, PlanAuditor, PlanConflict, PlanReference, PlansOutcome};
+pub use plans::{
+    Counterpart, PlanApproach, PlanAuditor, PlanConflict, PlanReference, PlanSeparations, PlansOutcome, TrackingError,
+};
 pub use second_pass::{PairSample, PairSeries, PositionLookup};
 pub use settings::{
     Interpolation, RecordedError, Settings, TOUCHING_CYLINDER, TOUCHING_ELLIPSOIDS, TimedSetting, VehicleSettings,

@@ -7,32 +7,32 @@
 //! A plan that ends is held, flown on, or unknown ([`PlanEnd`]). Held and continued plans are compared until both have
 //! ended.
 //!
+//! If the positions of the vehicles are recorded too, each plan is also compared with the flights of all other vehicles.
+//! Only the time counts until the next plan of its vehicle starts. The largest distance of each flight from its own plan
+//! is found at the recorded positions.
+//!
 //! The distances are those of [`audit`](super::audit): enclosed on curves by Bernstein coefficients, and checked by
 //! parry. A bound on the motion of two plans leaves out those that are neither below their limit nor among the
 //! closest.
 
-use std::collections::BTreeMap;
 use std::mem;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
-use super::settings::{Limits, RecordedError, Settings};
+use super::flights::Flights;
+use super::plan_sweep::{Chord, Comparisons, Extent, Motion};
+use super::settings::{RecordedError, Settings};
 use super::vehicle::Vehicle;
-use crate::cross_check::KeepOut;
-use crate::findings::{Finding, LISTED, Shortlist, Tally};
-use crate::ledger::{Interruption, Results};
-use crate::outcome::{Approach, ObjectPair, Status};
-use crate::pair_sweep::PairSweep;
-use crate::polynomial::{derivative, motion_deviation};
+use crate::findings::{Finding, Tally};
+use crate::ledger::Interruption;
+use crate::outcome::{Approach, Status};
+use crate::polynomial::derivative;
 use crate::segment::Segment;
-use crate::sweep::{Interval, RelativeMotion};
+use crate::sweep::Interval;
 use tautline_core::swarm::Pair;
 use tautline_core::track::{Item, Plan, PlanEnd};
-
-/// Rounding of bounds on positions, relative to their coordinates: at most sixteen operations.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// Plan of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,22 +45,53 @@ pub struct PlanReference {
     pub published_s: f64,
 }
 
-/// Time during which two plans are, or may be, closer than their limit.
+/// Motion that a plan is compared with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Counterpart {
+    /// Plan of another vehicle.
+    Plan(PlanReference),
+    /// Recorded flight of another vehicle, given by its index.
+    Flight(usize),
+}
+
+impl Counterpart {
+    /// Returns the index of the vehicle.
+    #[must_use]
+    pub fn vehicle(self) -> usize {
+        match self {
+            Self::Plan(plan) => plan.vehicle,
+            Self::Flight(vehicle) => vehicle,
+        }
+    }
+
+    /// Returns the plan; `None` for a flight.
+    #[must_use]
+    pub fn plan(self) -> Option<PlanReference> {
+        match self {
+            Self::Plan(plan) => Some(plan),
+            Self::Flight(_) => None,
+        }
+    }
+}
+
+/// Time during which a plan and its counterpart are, or may be, closer than their limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanConflict {
-    /// Plan that was published last.
+    /// Plan; of two, the one that was published last.
     pub plan: PlanReference,
-    /// Plan that was valid at this publication.
-    pub other: PlanReference,
+    /// Plan that was valid at this publication, or flight.
+    pub other: Counterpart,
     /// Start \[s\].
     pub from_s: f64,
     /// End \[s\].
     pub to_s: f64,
-    /// Bounds of the smallest distance \[m\]; equal for a violation.
+    /// Bounds of the smallest distance \[m\]; equal for a violation. With a bounded motion of flights, a violation has no
+    /// lower bound.
     pub lower_m: f64,
     /// See `lower_m`.
     pub upper_m: f64,
-    /// Instant of the smallest distance \[s\]; `None` for an undecided time.
+    /// Instant of the smallest distance \[s\]; `None` for an undecided time, and if the two detectors contradict each
+    /// other.
     pub min_at_s: Option<f64>,
     /// Limit \[m\].
     pub limit_m: f64,
@@ -70,7 +101,9 @@ impl Finding for PlanConflict {
     type Subject = [(usize, u64); 2];
 
     fn subject(&self) -> Self::Subject {
-        [self.plan, self.other].map(|plan| (plan.vehicle, plan.number))
+        // Numbers of plans begin at 1.
+        let other = self.other.plan().map_or(0, |plan| plan.number);
+        [(self.plan.vehicle, self.plan.number), (self.other.vehicle(), other)]
     }
 
     fn span_s(&self) -> [f64; 2] {
@@ -78,33 +111,30 @@ impl Finding for PlanConflict {
     }
 
     fn excess(&self) -> f64 {
-        self.limit_m - self.lower_m
+        self.limit_m - if self.min_at_s.is_some() { self.upper_m } else { self.lower_m }
     }
 }
 
-/// Closest approach of the plans of two vehicles.
+/// Closest approach of the plan of a vehicle to the plans, or to the flight, of another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanApproach {
-    /// Plan that was published last.
+    /// Plan; of two, the one that was published last.
     pub plan: PlanReference,
-    /// Plan that was valid at this publication.
-    pub other: PlanReference,
+    /// Plan that was valid at this publication, or flight.
+    pub other: Counterpart,
     /// Distance and time.
     pub approach: Approach,
 }
 
-/// Result of an audit of plans.
+/// Separations of plans from other plans, or from flights.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PlansOutcome {
-    /// Verdict; undecided if no two plans were compared.
+pub struct PlanSeparations {
+    /// Verdict. It is undecided if nothing was compared, or if the motion of a flight is unknown during a comparison.
     pub status: Status,
-    /// Motion after the end of a plan.
-    pub end: PlanEnd,
-    /// Number of plans.
-    pub plans: u64,
-    /// Number of comparisons of a plan with the plans of another vehicle.
+    /// Number of comparisons of a plan with a plan, or with a flight. A comparison of two vehicles that are on the ground
+    /// throughout does not count.
     pub comparisons: u64,
-    /// Times below the limit, by start; of a long list the worst, and the first of each two plans.
+    /// Times below the limit, by start; of a long list the worst, and the first of each two motions.
     pub violations: Vec<PlanConflict>,
     /// Undecided times, shortened likewise.
     pub undecided: Vec<PlanConflict>,
@@ -112,79 +142,36 @@ pub struct PlansOutcome {
     pub violations_tally: Tally,
     /// Number of undecided times.
     pub undecided_tally: Tally,
-    /// Closest plans, of at most ten pairs of vehicles.
+    /// Closest approaches, of at most ten pairs of vehicles.
     pub closest: Vec<PlanApproach>,
     /// Number of intervals in which the two detectors contradict each other.
     pub disagreements: u64,
 }
 
-/// Uniform motion over a segment, with a bound on the distance of the segment from it.
-#[derive(Clone, Copy, Debug)]
-struct Chord {
-    from_s: f64,
-    to_s: f64,
-    from: Vector3<f64>,
-    to: Vector3<f64>,
-    deviation_m: f64,
+/// Distance of a flight from the plan of its vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackingError {
+    /// Plan.
+    pub plan: PlanReference,
+    /// Instant \[s\].
+    pub at_s: f64,
+    /// Distance \[m\].
+    pub distance_m: f64,
 }
 
-impl Chord {
-    fn new(segment: &Segment) -> Self {
-        let Segment { from_s, to_s, from, to, .. } = *segment;
-        let curved = segment.curve().map_or(0.0, |_| motion_deviation(&segment.local(Interval { from_s, to_s })));
-        let rounding = segment.rounding() + ROUNDING * (from.amax() + to.amax());
-        Self { from_s, to_s, from, to, deviation_m: curved + rounding }
-    }
-
-    #[inline]
-    fn position(&self, time_s: f64) -> Vector3<f64> {
-        let length_s = self.to_s - self.from_s;
-        let share = if length_s > 0.0 { ((time_s - self.from_s) / length_s).clamp(0.0, 1.0) } else { 0.0 };
-        self.from + (self.to - self.from) * share
-    }
-
-    /// Returns a lower bound on the distance from another chord while both last; infinite if they share no instant.
-    #[inline]
-    fn distance_m(&self, other: &Self) -> f64 {
-        let (from_s, to_s) = (self.from_s.max(other.from_s), self.to_s.min(other.to_s));
-        if from_s > to_s {
-            return f64::INFINITY;
-        }
-        let deviation_m = self.deviation_m + other.deviation_m;
-        // A jump has two positions at one instant.
-        if self.from_s >= self.to_s || other.from_s >= other.to_s {
-            let reach_m = (self.to - self.from).norm() + (other.to - other.from).norm();
-            return (self.from - other.from).norm() - reach_m - deviation_m;
-        }
-        let [start, end] = [from_s, to_s].map(|time_s| self.position(time_s) - other.position(time_s));
-        RelativeMotion::new(start, end).closest().separation_m() * (1.0 - ROUNDING) - deviation_m
-    }
-}
-
-/// Box around the motion, without the motion after its end.
-#[derive(Clone, Copy, Debug)]
-struct Extent {
-    low: Vector3<f64>,
-    high: Vector3<f64>,
-}
-
-impl Extent {
-    fn new(chords: &[Chord]) -> Self {
-        let empty = Self { low: Vector3::repeat(f64::INFINITY), high: Vector3::repeat(f64::NEG_INFINITY) };
-        chords.iter().fold(empty, |all, chord| {
-            let aside = Vector3::repeat(chord.deviation_m);
-            Self {
-                low: all.low.inf(&(chord.from.inf(&chord.to) - aside)),
-                high: all.high.sup(&(chord.from.sup(&chord.to) + aside)),
-            }
-        })
-    }
-
-    #[inline]
-    fn is_within(&self, other: &Self, distance_m: f64) -> bool {
-        let aside = (self.low - other.high).sup(&(other.low - self.high));
-        aside.max() <= distance_m
-    }
+/// Result of an audit of plans.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlansOutcome {
+    /// Motion after the end of a plan.
+    pub end: PlanEnd,
+    /// Number of plans.
+    pub plans: u64,
+    /// Separations of each plan from the plans that were valid at its publication.
+    pub published: PlanSeparations,
+    /// Separations of each plan from the flights of other vehicles; `None` without flights.
+    pub flown: Option<PlanSeparations>,
+    /// Largest distance of a flight from its plan at the recorded positions; `None` without flights of planned vehicles.
+    pub tracking_error: Option<TrackingError>,
 }
 
 /// Published plan as segments.
@@ -199,7 +186,7 @@ struct Known {
     to_s: f64,
     /// Position and velocity at the end.
     last: (Vector3<f64>, Vector3<f64>),
-    /// Start of the next plan of the vehicle, which replaces this one \[s\].
+    /// Start of the next plan of the vehicle, which replaces this one, or its publication if that is later \[s\].
     until_s: f64,
     radius_m: f64,
 }
@@ -219,31 +206,43 @@ impl Known {
         let tail = Segment::straight(self.to_s, until_s, from, to);
         (until_s > self.to_s).then(|| Segment { grounded: grounded.or(tail.grounded), ..tail })
     }
+
+    /// Returns the motion up to an instant.
+    fn motion(&self, end: PlanEnd, until_s: f64) -> Motion<'_> {
+        let tail = self.tail(end, until_s);
+        Motion { segments: &self.segments, chords: &self.chords, tail, radius_m: self.radius_m }
+    }
+
+    /// Returns the time in which the vehicle flies the plan.
+    fn flown(&self) -> Interval {
+        Interval { from_s: self.from_s.max(self.reference.published_s), to_s: self.until_s }
+    }
+
+    /// Returns the position at an instant from the start on; `None` if the motion is unknown.
+    fn position(&self, end: PlanEnd, time_s: f64) -> Option<Vector3<f64>> {
+        let next = self.segments.partition_point(|segment| segment.to_s < time_s);
+        let tail = || self.tail(end, time_s).map(|tail| tail.to);
+        self.segments.get(next).map_or_else(tail, |segment| Some(segment.position(time_s)))
+    }
 }
 
-/// Audits published plans in order of publication.
+/// Audits published plans in order of publication, then flights.
 #[derive(Clone, Debug)]
 pub struct PlanAuditor {
-    /// Settings without the ends of the judged time, which apply to the motion after the end of a plan too.
+    /// Settings of plans. The ends of the judged time apply to the motion after the end of a plan too, and are left out
+    /// here.
     settings: Settings,
     judged: Interval,
-    limits: Limits,
     end: PlanEnd,
     /// Valid plans of each vehicle, in order of their starts.
     fleet: Vec<Vec<Known>>,
-    /// Number of plans of each vehicle.
+    /// Plans that are no longer valid, for the comparison with flights.
+    past: Vec<Known>,
+    flights: Option<Flights>,
+    /// Numbers of plans of each vehicle.
     counts: Vec<u64>,
     now_s: f64,
-    comparisons: u64,
-    results: Results,
-    /// Plans of the closest approaches.
-    closest: BTreeMap<Pair, [PlanReference; 2]>,
-    violations: Shortlist<PlanConflict>,
-    undecided: Shortlist<PlanConflict>,
-    /// Numbers of violations and of undecided times.
-    found: [u64; 2],
-    are_counts_exact: bool,
-    disagreements: u64,
+    published: Comparisons,
 }
 
 impl PlanAuditor {
@@ -255,32 +254,44 @@ impl PlanAuditor {
     pub fn new(settings: Settings, end: PlanEnd) -> Result<Self, RecordedError> {
         settings.check()?;
         Ok(Self {
-            limits: settings.limits(),
+            published: Comparisons::new(settings.limits(), true),
             judged: settings.window(),
-            settings: Settings { from_s: None, until_s: None, ..settings },
+            settings: Settings { from_s: None, until_s: None, motion: None, ..settings },
             end,
             fleet: Vec::new(),
+            past: Vec::new(),
+            flights: None,
             counts: Vec::new(),
             now_s: f64::NEG_INFINITY,
-            comparisons: 0,
-            results: Results::default(),
-            closest: BTreeMap::new(),
-            violations: Shortlist::new(LISTED),
-            undecided: Shortlist::new(LISTED),
-            found: [0; 2],
-            are_counts_exact: true,
-            disagreements: 0,
         })
     }
 
-    /// Stops soon after the flag is set: [`push`](Self::push) then returns [`RecordedError::Interrupted`].
+    /// Stops soon after the flag is set: [`push`](Self::push) and [`finish`](Self::finish) then return
+    /// [`RecordedError::Interrupted`].
     #[must_use]
     pub fn with_interruption(mut self, flag: Arc<AtomicBool>) -> Self {
-        self.results.interruption = Interruption::new(flag);
+        self.published.set_interruption(Interruption::new(flag));
         self
     }
 
-    /// Judges the next plan; returns the times at which it is below its limit. `names` are those of all vehicles.
+    /// Also compares the plans with flights, whose items [`push_flights`](Self::push_flights) takes. The memory grows
+    /// with the number of items and of plans. `settings` are those of the flights. Call it before the first
+    /// [`push`](Self::push).
+    #[must_use]
+    pub fn with_flights(self, settings: &Settings) -> Self {
+        Self { flights: Some(Flights::new(settings)), ..self }
+    }
+
+    /// Takes the next items of flights, in order of time. `names` are those of all vehicles.
+    ///
+    /// # Errors
+    /// [`RecordedError`] if an item is invalid.
+    pub fn push_flights(&mut self, names: &[String], items: &[Item]) -> Result<(), RecordedError> {
+        self.flights.as_mut().map_or(Ok(()), |flights| flights.push(names, items))
+    }
+
+    /// Judges the next plan; returns the times at which it is, or may be, below its limit. `names` are those of all
+    /// vehicles.
     ///
     /// # Errors
     /// [`RecordedError`] if the plan is invalid, was published before the last one, or the work is interrupted.
@@ -315,7 +326,7 @@ impl PlanAuditor {
             if other != plan.vehicle {
                 self.compare(&known, other, &mut conflicts);
             }
-            if self.results.interruption.is_set() {
+            if self.published.is_interrupted() {
                 return Err(RecordedError::Interrupted);
             }
         }
@@ -323,7 +334,7 @@ impl PlanAuditor {
         Ok(conflicts)
     }
 
-    /// Returns the plan as segments; `None` if nothing of it is in the judged time.
+    /// Returns the plan as segments; `None` if it has none.
     fn known(&self, name: &str, plan: &Plan, reference: PlanReference) -> Result<Option<Known>, RecordedError> {
         let mut vehicle = Vehicle::new(name, &self.settings, f64::INFINITY);
         for piece in &plan.pieces {
@@ -349,22 +360,29 @@ impl PlanAuditor {
         }))
     }
 
-    /// Replaces the motion of the vehicle from the start of its new plan on, and forgets plans of the past.
+    /// Replaces the motion of the vehicle from the start of its new plan on, but not before its publication. Forgets
+    /// plans of the past.
     fn replace(&mut self, known: Known) {
-        let plans = &mut self.fleet[known.reference.vehicle];
-        plans.retain(|earlier| earlier.from_s < known.from_s);
-        if let Some(last) = plans.last_mut() {
-            last.until_s = last.until_s.min(known.from_s);
+        let (now_s, plans) = (self.now_s, &mut self.fleet[known.reference.vehicle]);
+        for earlier in plans.iter_mut() {
+            earlier.until_s = earlier.until_s.min(known.from_s.max(now_s));
         }
         plans.push(known);
-        let now_s = self.now_s;
-        plans.retain(|plan| plan.until_s > now_s);
+        let is_over = |plan: &mut Known| plan.until_s <= now_s.max(plan.from_s);
+        let over = plans.extract_if(.., is_over);
+        if self.flights.is_some() {
+            self.past.extend(over);
+        } else {
+            over.for_each(drop);
+        }
     }
 
     /// Compares a new plan with the valid plans of another vehicle.
     fn compare(&mut self, known: &Known, other: usize, conflicts: &mut Vec<PlanConflict>) {
         let plans = mem::take(&mut self.fleet[other]);
         let ends = plans.iter().map(|plan| plan.to_s.min(plan.until_s)).fold(known.to_s, f64::max);
+        // A vehicle whose plan has ended at its publication is where the plan has led it.
+        let ends = if self.end == PlanEnd::Unknown { ends } else { ends.max(known.reference.published_s) };
         for plan in &plans {
             self.compare_two(known, plan, ends, conflicts);
         }
@@ -376,122 +394,114 @@ impl PlanAuditor {
         let judged = self.judged;
         let from_s = known.from_s.max(known.reference.published_s).max(other.from_s).max(judged.from_s);
         let window = Interval { from_s, to_s: until_s.min(other.until_s).min(judged.to_s) };
-        if window.from_s > window.to_s {
+        if window.from_s > window.to_s || self.end == PlanEnd::Unknown && known.to_s.min(other.to_s) < window.from_s {
             return;
         }
-        let tails = [known, other].map(|plan| plan.tail(self.end, window.to_s));
-        if self.end == PlanEnd::Unknown && known.to_s.min(other.to_s) < window.from_s {
+        let [motion, other_motion] = [known, other].map(|plan| plan.motion(self.end, window.to_s));
+        if !self.published.judges(&motion, &other_motion, window) {
             return;
         }
-        self.comparisons += 1;
+        // A held point is in the box of its plan.
+        let has_moving_tail =
+            [&motion, &other_motion].into_iter().flat_map(|motion| &motion.tail).any(|tail| tail.from != tail.to);
         let pair = Pair::new(known.reference.vehicle, other.reference.vehicle);
-        let objects = ObjectPair::Vehicles(pair);
-        let limit_m = self.limits.of_vehicles(known.radius_m, other.radius_m);
-        let cutoff = self.results.closest.cutoff(objects, limit_m);
-        let reach_m = self.limits.reach_m(limit_m.max(cutoff)).max();
-        if !may_come_within([known, other], &tails, reach_m) {
-            return;
+        let reach_m = self.published.reach_m(pair, [known.radius_m, other.radius_m]);
+        if has_moving_tail || known.extent.is_within(&other.extent, reach_m) {
+            let other = (Counterpart::Plan(other.reference), &other_motion);
+            conflicts.extend(self.published.compare((known.reference, &motion), other, window));
         }
-        let in_window = |(plan, tail): (&Known, Option<Segment>)| -> Vec<Segment> {
-            plan.segments.iter().cloned().chain(tail).filter_map(|segment| segment.clipped(window)).collect()
-        };
-        let [known_tail, other_tail] = tails;
-        let [mut first, mut second] = [(known, known_tail), (other, other_tail)].map(in_window);
-        if known.reference.vehicle > other.reference.vehicle {
-            mem::swap(&mut first, &mut second);
-        }
-        let before = self.results.closest.kept.iter().find(|kept| kept.pair == objects).copied();
-        let mut results = Results {
-            closest: mem::take(&mut self.results.closest),
-            interruption: self.results.interruption.clone(),
-            ..Results::bounded(self.results.interruption.clone())
-        };
-        let (target, keep_out, above) = (self.limits.target(), KeepOut::new(limit_m), self.limits.above);
-        PairSweep { pair: objects, target, keep_out, cutoff, judges: true, may_violate: true, above }.judge(
-            &first,
-            &second,
-            window,
-            &mut results,
-        );
-        self.results.closest = results.closest;
-        let after = self.results.closest.kept.iter().find(|kept| kept.pair == objects).copied();
-        let [plan, other] = [known, other].map(|known| known.reference);
-        if after.is_some() && after != before {
-            self.closest.insert(pair, [plan, other]);
-        }
-        self.disagreements += results.ledger.parry.disagreements;
-        let lists = results.ledger.into_lists();
-        let violations = lists.violations.iter().map(|found| PlanConflict {
-            plan,
-            other,
-            from_s: found.from_s,
-            to_s: found.to_s,
-            lower_m: found.min_m,
-            upper_m: found.min_m,
-            min_at_s: Some(found.min_at_s),
-            limit_m,
-        });
-        let violations: Vec<_> = violations.collect();
-        let undecided = lists.undecided.iter().map(|found| PlanConflict {
-            plan,
-            other,
-            from_s: found.from_s,
-            to_s: found.to_s,
-            lower_m: found.lower_m,
-            upper_m: found.upper_m,
-            min_at_s: None,
-            limit_m,
-        });
-        self.violations.extend(violations.iter().copied());
-        self.undecided.extend(undecided);
-        let tallies = [lists.violations_tally, lists.undecided_tally];
-        for (found, tally) in self.found.iter_mut().zip(tallies) {
-            *found += tally.count;
-            self.are_counts_exact &= tally.is_exact;
-        }
-        conflicts.extend(violations);
     }
 
-    /// Returns the verdict over all plans.
-    #[must_use]
-    pub fn finish(self) -> PlansOutcome {
-        let [violations, undecided] = [self.violations, self.undecided].map(Shortlist::into_list);
-        let is_decided = self.comparisons > 0 && undecided.is_empty() && self.disagreements == 0;
-        let tally = |count, listed| Tally { count, listed, is_exact: self.are_counts_exact };
-        let closest = self.results.closest.kept.iter().filter_map(|approach| {
-            let [plan, other] = *self.closest.get(&approach.pair.vehicles()?)?;
-            Some(PlanApproach { plan, other, approach: *approach })
-        });
-        PlansOutcome {
-            status: Status::new(!violations.is_empty(), is_decided),
-            end: self.end,
-            plans: self.counts.iter().sum(),
-            comparisons: self.comparisons,
-            violations_tally: tally(self.found[0], violations.len()),
-            undecided_tally: tally(self.found[1], undecided.len()),
-            violations,
-            undecided,
-            closest: closest.collect(),
-            disagreements: self.disagreements,
+    /// Returns the verdict over all plans and flights.
+    ///
+    /// # Errors
+    /// [`RecordedError`] if the flights are those of other vehicles than the plans, or the work is interrupted.
+    pub fn finish(mut self) -> Result<PlansOutcome, RecordedError> {
+        let (mut flown, mut tracking_error) = (None, None);
+        if let Some(flights) = self.flights.take() {
+            let mut plans = mem::take(&mut self.past);
+            plans.extend(mem::take(&mut self.fleet).into_iter().flatten());
+            plans.sort_by(|a, b| a.reference.published_s.total_cmp(&b.reference.published_s));
+            self.refuse_exchanged(&flights, &plans)?;
+            flown = Some(self.compare_with_flights(&flights, &plans)?);
+            tracking_error = self.tracking_error(&flights, &plans);
         }
+        let plans = self.counts.iter().sum();
+        Ok(PlansOutcome { end: self.end, plans, published: self.published.finish(), flown, tracking_error })
     }
-}
 
-/// Returns whether two plans, with the motions after their ends, could come within a distance.
-fn may_come_within([first, second]: [&Known; 2], tails: &[Option<Segment>; 2], distance_m: f64) -> bool {
-    let has_moving_tail = tails.iter().flatten().any(|tail| tail.from != tail.to);
-    // A held point is in the box of its plan.
-    if !has_moving_tail && !first.extent.is_within(&second.extent, distance_m) {
-        return false;
-    }
-    let [first_tail, second_tail] = tails.each_ref().map(|tail| tail.as_ref().map(Chord::new));
-    let second: Vec<_> = second.chords.iter().copied().chain(second_tail).collect();
-    let mut start = 0;
-    first.chords.iter().copied().chain(first_tail).any(|chord| {
-        while second.get(start).is_some_and(|other| other.to_s < chord.from_s) {
-            start += 1;
+    /// Compares each plan with the flights of all other vehicles, while its vehicle flies it.
+    fn compare_with_flights(&self, flights: &Flights, plans: &[Known]) -> Result<PlanSeparations, RecordedError> {
+        let mut comparisons = Comparisons::new(self.settings.limits(), flights.are_exact());
+        comparisons.set_interruption(self.published.interruption());
+        comparisons.has_gap = flights.has_contradiction();
+        for plan in plans {
+            for other in (0..flights.count()).filter(|other| *other != plan.reference.vehicle) {
+                if comparisons.is_interrupted() {
+                    return Err(RecordedError::Interrupted);
+                }
+                let (flown, Some(end_s)) = (plan.flown(), flights.end_s(other)) else { continue };
+                let known_s = if self.end == PlanEnd::Unknown { plan.to_s } else { f64::INFINITY };
+                let to_s = flown.to_s.min(self.judged.to_s).min(known_s).min(end_s);
+                let window = Interval { from_s: flown.from_s.max(self.judged.from_s), to_s };
+                let Some(part) = flights.part(other, window) else { continue };
+                comparisons.has_gap |= part.has_gap;
+                let (radius_m, tail) = (flights.radius_m(other), None);
+                let flight = Motion { segments: &part.segments, chords: &part.chords, tail, radius_m };
+                let motion = plan.motion(self.end, to_s);
+                if !comparisons.judges(&motion, &flight, window) {
+                    continue;
+                }
+                comparisons.compare((plan.reference, &motion), (Counterpart::Flight(other), &flight), window);
+            }
         }
-        let shared = second[start..].iter().take_while(|other| other.from_s <= chord.to_s);
-        shared.into_iter().any(|other| chord.distance_m(other) <= distance_m)
-    })
+        Ok(comparisons.finish())
+    }
+
+    /// Refuses plans whose vehicles have exchanged names. At the starts of its plans each of these vehicles is, on
+    /// average, farther away from its own plans than another one of them.
+    fn refuse_exchanged(&self, flights: &Flights, plans: &[Known]) -> Result<(), RecordedError> {
+        let vehicles = flights.count();
+        // Sums of the distances from the own flight and from another one, by planned and by other vehicle.
+        let mut sums = vec![[0.0; 2]; vehicles * vehicles];
+        for plan in plans {
+            let (vehicle, start_s) = (plan.reference.vehicle, plan.flown().from_s);
+            let Some(planned) = plan.position(self.end, start_s).filter(|_| vehicle < vehicles) else { continue };
+            let Some(own) = flights.position(vehicle, start_s) else { continue };
+            for other in 0..vehicles {
+                let Some(place) = flights.position(other, start_s) else { continue };
+                let sums = &mut sums[vehicle * vehicles + other];
+                sums[0] += flights.distance_m(planned, own);
+                sums[1] += flights.distance_m(planned, place);
+            }
+        }
+        let nearest = |vehicle: usize| {
+            let gain = |other: usize| sums[vehicle * vehicles + other][0] - sums[vehicle * vehicles + other][1];
+            (0..vehicles).max_by(|a, b| gain(*a).total_cmp(&gain(*b))).filter(|other| gain(*other) > 0.0)
+        };
+        let nearest: Vec<_> = (0..vehicles).map(nearest).collect();
+        for start in 0..vehicles {
+            let chain = std::iter::successors(nearest[start], |vehicle| nearest[*vehicle]);
+            if chain.take(vehicles).any(|vehicle| vehicle == start)
+                && let Some(other) = nearest[start]
+            {
+                let (vehicle, other) = (flights.name(start), flights.name(other));
+                return Err(RecordedError::ExchangedFlights { vehicle, other });
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the largest distance of a flight from its plan at the recorded positions.
+    fn tracking_error(&self, flights: &Flights, plans: &[Known]) -> Option<TrackingError> {
+        let errors = plans.iter().flat_map(|plan| {
+            let (vehicle, flown) = (plan.reference.vehicle, plan.flown());
+            let (from_s, to_s) = (flown.from_s.max(self.judged.from_s), flown.to_s.min(self.judged.to_s));
+            flights.instants_s(vehicle, Interval { from_s, to_s }).filter_map(move |at_s| {
+                let (planned, flown) = plan.position(self.end, at_s).zip(flights.position(vehicle, at_s))?;
+                Some(TrackingError { plan: plan.reference, at_s, distance_m: flights.distance_m(planned, flown) })
+            })
+        });
+        errors.max_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
+    }
 }

@@ -496,6 +496,16 @@ pub enum RecordedError {
         /// Problem.
         what: String,
     },
+    /// Each of some vehicles is farther from its own plans, at their starts, than another one of these vehicles.
+    #[error(
+        "the plans of vehicle {vehicle} start nearer to vehicle {other} than to {vehicle}, and the names could be exchanged"
+    )]
+    ExchangedFlights {
+        /// Name of the vehicle.
+        vehicle: String,
+        /// Name of the nearer vehicle.
+        other: String,
+    },
     /// The radius of a vehicle changes.
     #[error("vehicle {vehicle} at {time_s:?} s: the radius changes to {radius_m:?} m")]
     RadiusChanges {

@@ -45,6 +45,11 @@ impl<'a> Topic<'a> {
     }
 }
 
+/// Length of the header of CDR.
+const HEADER: usize = 4;
+/// Largest alignment of CDR, which padding stays below.
+const PADDING: usize = 8;
+
 /// Replaces the content of `bytes` with the message in CDR.
 pub(crate) fn encode(message: &impl Serialize, bytes: &mut Vec<u8>) -> io::Result<()> {
     bytes.clear();
@@ -55,12 +60,27 @@ pub(crate) fn encode(message: &impl Serialize, bytes: &mut Vec<u8>) -> io::Resul
 /// Reads a message in CDR of either byte order; the error describes the damage. Bytes after the last field are ignored,
 /// so that later versions can append fields.
 pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+    decode_start(bytes).map(|(message, _)| message)
+}
+
+/// Reads a message in CDR like [`decode`], and refuses bytes after the last field, except for padding.
+pub(crate) fn decode_whole<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+    let (message, rest) = decode_start(bytes)?;
+    if rest.len() < PADDING && rest.iter().all(|byte| *byte == 0) {
+        return Ok(message);
+    }
+    Err(format!("it has {} bytes after its last field", rest.len()))
+}
+
+/// Reads a message in CDR, and returns the bytes after it.
+fn decode_start<T: DeserializeOwned>(bytes: &[u8]) -> Result<(T, &[u8]), String> {
     let message = match bytes {
         [0, 1, _, _, body @ ..] => cdr_encoding::from_bytes::<T, LittleEndian>(body),
         [0, 0, _, _, body @ ..] => cdr_encoding::from_bytes::<T, BigEndian>(body),
         _ => return Err("it has no CDR header".to_owned()),
     };
-    message.map(|(message, _)| message).map_err(|error| error.to_string())
+    let (message, length) = message.map_err(|error| error.to_string())?;
+    Ok((message, bytes.get(HEADER + length..).unwrap_or_default()))
 }
 
 /// Returns the time in nanoseconds since the epoch of the clock; 0 for earlier times and NaN.

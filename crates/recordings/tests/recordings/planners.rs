@@ -189,16 +189,43 @@ fn repeated_curves_are_read_once_and_contradictory_ones_refused() {
     assert_refused(&error, "recording/duplicate-row", &format!("curve 2 on topic `{TOPIC}`"));
 }
 
+/// Returns a position at (1, 2, 3) on a topic, with a stamp in the second of the curves.
+fn odometry(topic: &'static str, nanosec: u32) -> Message {
+    let pose = (([1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 1.0]), [[0.0; 6]; 6]);
+    let message = (header(nanosec), "base_link", pose, ([[0.0; 3]; 2], [[0.0; 6]; 6]));
+    (topic, "nav_msgs/msg/Odometry", "cdr", 7, cdr(&message, true))
+}
+
 #[test]
-fn curves_beside_positions_need_a_topic() {
-    let odometry = (
-        header(5),
-        "base_link",
-        (([1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 1.0]), [[0.0; 6]; 6]),
-        ([[0.0; 3]; 2], [[0.0; 6]; 6]),
+fn curves_beside_positions_are_plans_of_the_vehicles_with_their_numbers() {
+    let curves = [of(&spline(12, 250_000_000, 0.0)), of(&spline(1, 0, 3.0))];
+    let flights = ["/uav2_1/odom", "/uav2_12/odom"].map(|topic| [odometry(topic, 0), odometry(topic, 200_000_000)]);
+    let bytes = mcap_of(&[&curves[..], &flights.concat()].concat());
+    let found = whole("plan.mcap", &bytes);
+    assert_eq!(
+        (found.samples().len(), &found.vehicles[..]),
+        (4, &["/uav2_1/odom".to_owned(), "/uav2_12/odom".to_owned()][..])
     );
-    let odometry = ("/odom", "nav_msgs/msg/Odometry", "cdr", 7, cdr(&odometry, true));
-    let both = [of(&spline(1, 0, 0.0)), odometry];
+    let (published, assumed) = plans(&bytes);
+    let name = |vehicle: &str| format!("/uav2_{vehicle}/odom");
+    assert_eq!(published, [(0.0, name("1"), 0.0, 4.0), (0.25, name("12"), 0.25, 4.25)]);
+    let numbers = "plans have the frame and the clock of the positions, and belong to the vehicles with their numbers in \
+                   the names";
+    assert!(assumed.contains(&numbers.to_owned()), "{assumed:?}");
+    // A vehicle without plans is no fault. A number in no name, in two names, and in all names are.
+    let other = [odometry("/uav2_7/odom", 0), odometry("/uav2_7/odom", 200_000_000)];
+    whole("plan.mcap", &mcap_of(&[&curves[..], &flights.concat(), &other].concat()));
+    let unknown = [&[of(&spline(3, 0, 9.0))], &flights.concat()[..]].concat();
+    assert_refused(&refused(&unknown, &ReadOptions::default()), "recording/ambiguous-topics", "");
+    let twice = [&curves[1..], &flights.concat()[..], &[odometry("/uav1_9/odom", 0)]].concat();
+    assert_refused(&refused(&twice, &ReadOptions::default()), "recording/ambiguous-topics", "");
+    let common = [&[of(&spline(2, 0, 9.0))], &flights.concat()[..]].concat();
+    assert_refused(&refused(&common, &ReadOptions::default()), "recording/ambiguous-topics", "");
+}
+
+#[test]
+fn curves_beside_positions_without_numbers_need_a_topic() {
+    let both = [of(&spline(1, 0, 0.0)), odometry("/odom", 0)];
     assert_refused(&refused(&both, &ReadOptions::default()), "recording/ambiguous-topics", "");
     assert_refused(&refused(&both, &topics(&[TOPIC, "/odom"])), "recording/ambiguous-topics", "");
     assert_refused(&refused(&both, &topics(&["/plan"])), "recording/unknown-topic", "");
@@ -241,7 +268,11 @@ fn wrong_curves_name_the_field_and_its_value() {
         let mut message = spline(1, 0, 0.0);
         spoil(&mut message);
         let error = refused(&[of(&message)], &ReadOptions::default());
-        let place = if code == "recording/overflow" { String::new() } else { format!("curve 1 on topic `{TOPIC}`") };
+        let place = if code == "recording/overflow" {
+            format!("the curve of drone 1 that starts at {SEC}000000000 ns")
+        } else {
+            format!("curve 1 on topic `{TOPIC}`")
+        };
         assert_refused(&error, code, &place);
         assert!(error.to_string().contains(problem), "{error}");
     }
@@ -290,10 +321,6 @@ fn wrong_curves_name_the_field_and_its_value() {
     last.2.1 = 999_999_999;
     let found = whole("plan.mcap", &mcap_of(&[of_polynomials(&last)]));
     assert_eq!(piece(&found.items[0]).from_s, 0.999_999_999);
-    // Bytes after the last field are ignored, as those of all messages in CDR.
-    let (topic, schema, encoding, time, mut bytes) = of_polynomials(&last);
-    bytes.extend([1; 8]);
-    assert_eq!(whole("plan.mcap", &mcap_of(&[(topic, schema, encoding, time, bytes)])).items, found.items);
     let cut = (TOPIC, B_SPLINE, "cdr", 7, cdr(&spline(1, 0, 0.0), true)[..60].to_vec());
     assert_refused(
         &refused(&[cut], &ReadOptions::default()),
@@ -531,6 +558,102 @@ fn plans_are_published_at_their_log_times_or_at_their_starts() {
     let (found, assumed) = plans(&mcap_of(&[at(&replanned, 7), at(&spline(4, 250_000_000, 0.0), 9)]));
     assert_eq!(found, [(0.25, "4".to_owned(), 0.25, 4.25), (2.25, "4".to_owned(), 2.25, 6.25)]);
     assert_eq!(assumed, ["plans are published at their starts"]);
+}
+
+/// Returns a message that is logged some seconds after the second of the curves.
+fn logged(message: &Bspline, seconds: f64) -> Message {
+    let start_ns = u64::try_from(SEC).expect("after 1970") * 1_000_000_000;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some seconds")]
+    let log_ns = start_ns + (seconds * 1e9) as u64;
+    (TOPIC, B_SPLINE, "cdr", log_ns, cdr(message, true))
+}
+
+/// Returns a curve that starts some seconds later.
+fn later(drone: i32, seconds: i32, y: f64) -> Bspline {
+    let mut curve = spline(drone, 0, y);
+    curve.3.0 += seconds;
+    curve
+}
+
+#[test]
+fn the_smallest_log_time_is_the_publication() {
+    let one = spline(4, 0, 0.0);
+    let instants = |messages: &[Message]| plans(&mcap_of(messages)).0.iter().map(|plan| plan.0).collect::<Vec<_>>();
+    assert_eq!(instants(&[logged(&one, 3.0), logged(&one, 0.5)]), [0.5]);
+    assert_eq!(instants(&[logged(&one, 0.5), logged(&one, 3.0)]), [0.5]);
+}
+
+#[test]
+fn a_curve_that_is_replaced_before_its_start_is_not_flown() {
+    // Published at 1 s for 5 s; replaced at 2 s by a curve from 3 s on.
+    let messages = [logged(&spline(4, 0, 0.0), 0.0), logged(&later(4, 5, 1.0), 1.0), logged(&later(4, 3, 2.0), 2.0)];
+    let found = whole("plan.mcap", &mcap_of(&messages));
+    assert_near(position(&found, "4", 2.5), [3.5, 0.0, 1.0]);
+    assert_near(position(&found, "4", 6.0), [4.0, 2.0, 1.0]);
+    let is_noted = |found: &Whole| found.notes.iter().any(|note| note.starts_with("1 curve is not flown"));
+    assert!(is_noted(&found), "{:?}", found.notes);
+    assert_eq!(plans(&mcap_of(&messages)).0.len(), 3, "it was published");
+    // Negative twin: published the other way round, it is flown from 5 s on.
+    let messages = [logged(&spline(4, 0, 0.0), 0.0), logged(&later(4, 3, 2.0), 1.0), logged(&later(4, 5, 1.0), 2.0)];
+    let found = whole("plan.mcap", &mcap_of(&messages));
+    assert_near(position(&found, "4", 6.0), [2.0, 1.0, 1.0]);
+    assert!(!is_noted(&found), "{:?}", found.notes);
+}
+
+#[test]
+fn all_curves_decide_whether_log_times_have_the_clock_of_the_starts() {
+    let at_starts = ["plans are published at their starts".to_owned()];
+    let instants = |messages: &[Message]| {
+        let (found, assumed) = plans(&mcap_of(messages));
+        (found.iter().map(|plan| plan.0).collect::<Vec<_>>(), assumed)
+    };
+    // A single curve far ahead is no other clock.
+    let far = [logged(&spline(4, 0, 0.0), 0.5), logged(&later(5, 100, 1.0), 1.0)];
+    assert_eq!(instants(&far), (vec![0.5, 1.0], vec![]));
+    assert_eq!(instants(&far[1..]).1, at_starts);
+    // Curves are not late alone: then the recorder's clock is.
+    let late = [logged(&spline(4, 0, 0.0), 6.0), logged(&later(5, 1, 1.0), 7.0)];
+    assert_eq!(instants(&late), (vec![0.0, 1.0], at_starts.to_vec()));
+    let some = [late[0].clone(), logged(&later(5, 1, 1.0), 0.5)];
+    assert_eq!(instants(&some), (vec![0.5, 6.0], vec![]));
+    // Starts of two clocks.
+    let mut stray = spline(5, 0, 1.0);
+    stray.3 = (0, 0);
+    assert_refused(
+        &refused(&[logged(&spline(4, 0, 0.0), 0.5), logged(&stray, 0.5)], &ReadOptions::default()),
+        "recording/several-clocks",
+        "",
+    );
+}
+
+#[test]
+fn parts_between_equal_times_are_left_out() {
+    // The knots 1 and 1 + 2^-52 are one instant after 1000 s.
+    let mut curve = later(4, 1000, 0.0);
+    curve.4 = [-3.0, -2.0, -1.0, 0.0, 1.0, 1.0 + f64::EPSILON, 2.0, 3.0, 4.0, 5.0, 6.0].to_vec();
+    let found = whole("plan.mcap", &mcap_of(&[of(&later(5, 0, 3.0)), of(&curve)]));
+    let parts = pieces(&found).into_iter().filter(|piece| piece.vehicle == 0 && piece.from_s >= 1000.0).count();
+    assert_eq!(parts, 3);
+    curve.5[3][0] = 1e300;
+    curve.5[4][0] = -1e300;
+    curve.4[5] = 1.0 + 1e-10;
+    let error = refused(&[of(&curve)], &ReadOptions::default());
+    let place = format!("the curve of drone 4 that starts at {}000000000 ns", SEC + 1000);
+    assert_refused(&error, "recording/overflow", &place);
+}
+
+#[test]
+fn bytes_after_a_message_are_refused() {
+    let with_rest = |rest: &[u8]| {
+        let mut message = of(&spline(1, 0, 0.0));
+        message.4.extend_from_slice(rest);
+        read_bytes("plan.mcap", &mcap_of(&[message]), &ReadOptions::default())
+    };
+    with_rest(&[0; 4]).expect("padding");
+    for rest in [&[0; 8][..], &[0, 1]] {
+        let error = with_rest(rest).expect_err("more fields");
+        assert!(error.to_string().contains("bytes after its last field"), "{error}");
+    }
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! Answers to the parts of a question, the same for a flight and for a recording.
 
 use std::collections::BTreeMap;
+use std::iter;
 
 use serde::{Serialize, Serializer};
 
 use tautline_audit::envelope::{Exceedance, Limit};
-use tautline_audit::recorded::{PlanApproach, PlanConflict, PlanReference, WellClearLoss};
+use tautline_audit::recorded::{Counterpart, PlanApproach, PlanConflict, PlanReference, WellClearLoss};
 use tautline_audit::{Approach, LISTED, ObjectPair, Status, Tally, Undecided, Violation, WellClear};
 use tautline_core::fact::Fact;
 use tautline_core::swarm::Pair;
@@ -84,6 +85,8 @@ pub enum Part {
     Plan,
     /// Separations of published plans: of each plan from those that were valid at its publication.
     PublishedPlans,
+    /// Separations of published plans from the recorded flights of other vehicles.
+    FlownPlans,
 }
 
 impl Part {
@@ -97,6 +100,7 @@ impl Part {
             Self::Presence => "presence",
             Self::Plan => "plan",
             Self::PublishedPlans => "published_plans",
+            Self::FlownPlans => "flown_plans",
         }
     }
 }
@@ -201,9 +205,10 @@ pub struct Finding {
     /// Smallest vertical distance of a loss of well clear \[m\], whose value is the horizontal one; absent for others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vertical_m: Option<f64>,
-    /// Published plans of the two vehicles, the later published one first; absent for others.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub plans: Option<[PublishedPlan; 2]>,
+    /// Published plans of the two vehicles, the later published one first, or plan of the first vehicle, whose
+    /// counterpart is a flight; absent for others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub plans: Vec<PublishedPlan>,
 }
 
 /// Plan that a vehicle published.
@@ -222,6 +227,11 @@ impl From<PlanReference> for PublishedPlan {
     }
 }
 
+/// Returns a plan, and the plan that it is compared with.
+fn published(plan: PlanReference, other: Counterpart) -> Vec<PublishedPlan> {
+    iter::once(plan).chain(other.plan()).map(PublishedPlan::from).collect()
+}
+
 /// Indices of the subjects of a finding, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Objects {
@@ -233,7 +243,7 @@ pub enum Objects {
 
 impl Finding {
     fn new(objects: Objects, subjects: impl Into<Vec<String>>, value: Enclosure, limit: Option<f64>) -> Self {
-        let (subjects, plans) = (subjects.into(), None);
+        let (subjects, plans) = (subjects.into(), Vec::new());
         let (from_s, to_s, at_s, rate_hz, vertical_m) = (None, None, None, None, None);
         Self { objects, subjects, from_s, to_s, at_s, value, limit, rate_hz, vertical_m, plans }
     }
@@ -294,19 +304,17 @@ impl Finding {
         Self { vertical_m: Some(found.vertical_m), ..finding }
     }
 
-    /// Returns the closest approach of two published plans; `names` are those of their vehicles.
+    /// Returns the closest approach of a published plan; `names` are those of the two vehicles.
     pub(super) fn plan_approach(found: &PlanApproach, names: [String; 2], unit: &'static str) -> Self {
-        let plans = Some([found.plan, found.other].map(PublishedPlan::from));
-        Self { plans, ..Self::approach(&found.approach, names, unit) }
+        Self { plans: published(found.plan, found.other), ..Self::approach(&found.approach, names, unit) }
     }
 
-    /// Returns a time in which two published plans are, or may be, closer than their limit.
+    /// Returns a time in which a published plan and its counterpart are, or may be, closer than their limit.
     pub(super) fn plan_conflict(found: &PlanConflict, names: [String; 2], unit: &'static str) -> Self {
-        let objects = Objects::Pair(ObjectPair::Vehicles(Pair::new(found.plan.vehicle, found.other.vehicle)));
+        let objects = Objects::Pair(ObjectPair::Vehicles(Pair::new(found.plan.vehicle, found.other.vehicle())));
         let value = Enclosure::new(found.lower_m, found.upper_m, unit);
-        let plans = Some([found.plan, found.other].map(PublishedPlan::from));
         let finding = Self::new(objects, names, value, Some(found.limit_m)).over(found.from_s, found.to_s);
-        Self { at_s: found.min_at_s, plans, ..finding }
+        Self { at_s: found.min_at_s, plans: published(found.plan, found.other), ..finding }
     }
 
     /// Returns the distance of a vehicle from its plan.

@@ -15,7 +15,7 @@ impl Answer {
         match self.part {
             Part::Limit(limit) => self.brief_on_limit(limit, status),
             Part::WellClear(limits) => self.brief_on_well_clear(limits, status),
-            Part::PublishedPlans => self.brief_on_published_plans(status),
+            Part::PublishedPlans | Part::FlownPlans => self.brief_on_plans(status),
             Part::Separation | Part::Presence | Part::Plan => String::new(),
         }
     }
@@ -81,7 +81,8 @@ impl Answer {
         }
     }
 
-    fn brief_on_published_plans(&self, status: Status) -> String {
+    fn brief_on_plans(&self, status: Status) -> String {
+        let is_flown = self.part == Part::FlownPlans;
         match status {
             Status::Clear => {
                 let closest = self.closest.first().map_or(String::new(), |finding| {
@@ -90,13 +91,15 @@ impl Answer {
                     let time = finding.at_s.map_or(String::new(), |at_s| format!(" at {}", seconds(at_s)));
                     format!(" closer than {least} {}, {}{time}", finding.value.unit, finding.names())
                 });
-                format!("published plans never come{closest}")
+                let plans = if is_flown { "plans and flights" } else { "published plans" };
+                format!("{plans} never come{closest}")
             }
             Status::Violation => {
                 let deepest =
                     self.violations.listed.iter().min_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
                 let others = match self.violations.count {
                     ..=1 => String::new(),
+                    count if is_flown => format!("; {count} violations of plans and flights in all"),
                     count => format!("; {count} violations of plans in all"),
                 };
                 deepest.map_or(String::new(), |finding| {
@@ -106,6 +109,7 @@ impl Answer {
             }
             Status::Undecided => match self.undecided.listed.first() {
                 Some(finding) => finding.sentence(self.part, false),
+                None if is_flown => "flights have gaps, or no plan is valid during another vehicle's flight".to_owned(),
                 None => "no two published plans are known at the same time".to_owned(),
             },
         }
@@ -177,9 +181,10 @@ impl Answer {
 }
 
 /// Returns the closest approach, the violations and the undecided times, the gravest first. Distances and times are
-/// those of the audit. Findings against a plan and between plans are left out, because a replay shows the flight.
+/// those of the audit. Findings on plans are left out, because a replay shows the flight.
 pub(super) fn moments(answers: &[Answer]) -> impl Iterator<Item = Moment> + '_ {
-    let answers = answers.iter().filter(|answer| !matches!(answer.part, Part::Plan | Part::PublishedPlans));
+    let is_of_plan = |answer: &&Answer| matches!(answer.part, Part::Plan | Part::PublishedPlans | Part::FlownPlans);
+    let answers = answers.iter().filter(move |answer| !is_of_plan(answer));
     let violations = answers.clone().flat_map(Answer::violation_moments);
     let undecided = answers.clone().flat_map(Answer::undecided_moments);
     answers.filter_map(Answer::closest_moment).chain(violations).chain(undecided)
@@ -189,6 +194,7 @@ pub(super) fn moments(answers: &[Answer]) -> impl Iterator<Item = Moment> + '_ {
 pub(super) fn closest_table(answer: &Answer, are_of_obstacles: bool) -> Section {
     let heading = match answer.part {
         Part::PublishedPlans => "Closest published plans",
+        Part::FlownPlans => "Closest plans and flights",
         _ if are_of_obstacles => "Closest to obstacles",
         _ => "Closest pairs",
     };
@@ -239,9 +245,12 @@ pub(super) fn shortened_in_words(tally: Tally) -> String {
 impl Finding {
     /// Returns the names of all subjects, and their plans.
     pub(super) fn names(&self) -> String {
-        let Some(plans) = &self.plans else { return self.subjects.join(" and ") };
-        let named = self.subjects.iter().zip(plans).map(|(vehicle, PublishedPlan { number, published_s })| {
-            format!("plan {number} of {vehicle} (published at {})", seconds(*published_s))
+        let named = self.subjects.iter().enumerate().map(|(index, vehicle)| match self.plans.get(index) {
+            Some(PublishedPlan { number, published_s }) => {
+                format!("plan {number} of {vehicle} (published at {})", seconds(*published_s))
+            }
+            None if self.plans.is_empty() => vehicle.clone(),
+            None => format!("the flight of {vehicle}"),
         });
         named.collect::<Vec<_>>().join(" and ")
     }

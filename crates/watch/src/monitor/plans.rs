@@ -1,9 +1,10 @@
 //! Published plans of planners: each is judged at its arrival against the plans of other drones that are valid then.
 //!
 //! Messages of planners name no vehicle of the positions, so drones have names of their own: their numbers. A plan
-//! starts at a time of the planner's clock. If positions have a common clock, it is the planner's clock, too. Otherwise
-//! the planner's clock is that of this machine. A start that is more than [`LARGEST_LEAD_S`] from the arrival
-//! contradicts this.
+//! starts at a time of the planners' clock, on which plans are judged. The present time of this clock follows from the
+//! clock of the positions if these have a common one, and otherwise from that of this machine. The choice may change
+//! between two plans, but does not move them against each other. A start that is more than [`LARGEST_LEAD_S`] from the
+//! arrival contradicts the choice.
 
 use std::collections::hash_map::DefaultHasher;
 use std::collections::{BTreeMap, VecDeque};
@@ -13,7 +14,7 @@ use super::Monitor;
 use crate::event::{Event, Fault, PlanClock, Problem};
 use crate::settings::TimeBase;
 use crate::source::PlanMessage;
-use tautline_audit::recorded::{self, PlanAuditor, PlanConflict, PlanReference};
+use tautline_audit::recorded::{self, Counterpart, PlanAuditor, PlanConflict, PlanReference};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::track::{Piece, Plan, PlanEnd};
 use tautline_recordings::read::LivePlan;
@@ -26,11 +27,11 @@ const MOST_PIECES: usize = 1000;
 /// Largest number of plans of a drone that are valid or start later.
 const MOST_VALID: usize = 100;
 /// Number of the newest plans of a drone by which a repetition is recognised.
-const MOST_SEEN: usize = 64;
+const MOST_SEEN: usize = 1024;
 /// Largest number of conflicts that are kept for the state.
 const MOST_CONFLICTS: usize = 4096;
 
-/// Plans of all drones. Times are those of the caller's clock \[s\].
+/// Plans of all drones. Times are those of the planners' clock since its second of the first plan \[s\].
 #[derive(Clone, Debug)]
 pub(super) struct PublishedPlans {
     auditor: PlanAuditor,
@@ -46,8 +47,12 @@ pub(super) struct PublishedPlans {
     /// Whether each plan so far is of a planner that holds the last point.
     are_held: bool,
     clock: PlanClock,
-    /// Time of this machine since 1970 at time 0 \[ns\].
+    /// Time of this machine since 1970 at time 0 of the caller \[ns\].
     machine_ns: Option<i64>,
+    /// Time of the planners' clock at time 0 here \[ns\].
+    zero_ns: i64,
+    /// Time of the caller's clock less that of the planners' clock, at the last plan \[s\].
+    offset_s: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -58,10 +63,12 @@ struct Drone {
     starts_s: Vec<f64>,
     /// Starts \[ns\] and digests of its newest plans.
     seen: VecDeque<(i64, u64)>,
+    /// Latest start among older plans \[ns\].
+    forgotten_ns: Option<i64>,
 }
 
 impl PublishedPlans {
-    fn new(delta_m: f64, end: PlanEnd) -> Result<Self, Problem> {
+    fn new(delta_m: f64, end: PlanEnd, start_ns: i64) -> Result<Self, Problem> {
         let auditor = PlanAuditor::new(recorded::Settings::delta(delta_m), end).map_err(|error| wrong(&error))?;
         Ok(Self {
             auditor,
@@ -73,6 +80,8 @@ impl PublishedPlans {
             are_held: true,
             clock: PlanClock::Positions,
             machine_ns: None,
+            zero_ns: start_ns.div_euclid(NS_PER_S).saturating_mul(NS_PER_S),
+            offset_s: 0.0,
         })
     }
 
@@ -92,11 +101,16 @@ impl PublishedPlans {
 
     /// Returns whether the plan was published before. A repetition is no new publication.
     fn is_repeated(&self, plan: &LivePlan) -> Result<bool, Problem> {
-        let seen = self.drones.get(&plan.drone).map(|drone| &drone.seen);
-        match seen.into_iter().flatten().find(|(start_ns, _)| *start_ns == plan.start_ns) {
+        let LivePlan { drone, start_ns, .. } = plan;
+        let Some(known) = self.drones.get(drone) else { return Ok(false) };
+        match known.seen.iter().find(|(seen_ns, _)| seen_ns == start_ns) {
+            // A plan among older starts may be a repetition.
+            None if known.forgotten_ns.is_some_and(|forgotten_ns| *start_ns <= forgotten_ns) => Err(wrong(&format!(
+                "drone {drone} has {MOST_SEEN} newer plans than that which starts at {start_ns} ns"
+            ))),
             None => Ok(false),
             Some((_, known)) if *known == digest(plan) => Ok(true),
-            Some(_) => Err(wrong(&format!("another plan of drone {} starts at {} ns", plan.drone, plan.start_ns))),
+            Some(_) => Err(wrong(&format!("another plan of drone {drone} starts at {start_ns} ns"))),
         }
     }
 
@@ -105,7 +119,8 @@ impl PublishedPlans {
         let index = self.drones.get(&plan.drone).map_or(self.names.len(), |drone| drone.index);
         if index == self.names.len() {
             self.names.push(plan.drone.to_string());
-            self.drones.insert(plan.drone, Drone { index, starts_s: Vec::new(), seen: VecDeque::new() });
+            let (starts_s, seen) = (Vec::new(), VecDeque::new());
+            self.drones.insert(plan.drone, Drone { index, starts_s, seen, forgotten_ns: None });
         }
         self.published_s = self.published_s.max(published_s);
         let published_s = self.published_s;
@@ -126,8 +141,10 @@ impl PublishedPlans {
         let found = self.auditor.push(&self.names, &published).map_err(|error| wrong(&error))?;
         drone.starts_s.retain(|other_s| *other_s < start_s);
         drone.starts_s.push(start_s);
-        if drone.seen.len() == MOST_SEEN {
-            drone.seen.pop_front();
+        if drone.seen.len() == MOST_SEEN
+            && let Some((start_ns, _)) = drone.seen.pop_front()
+        {
+            drone.forgotten_ns = drone.forgotten_ns.max(Some(start_ns));
         }
         drone.seen.push_back((plan.start_ns, digest(plan)));
         self.are_held &= plan.is_held;
@@ -142,7 +159,7 @@ impl PublishedPlans {
     /// Ends the conflicts of the earlier plans of a drone at the start of its new plan \[s\].
     fn replace(&mut self, drone: usize, start_s: f64) {
         self.conflicts.retain_mut(|conflict| {
-            if ![conflict.plan.vehicle, conflict.other.vehicle].contains(&drone) {
+            if ![conflict.plan.vehicle, conflict.other.vehicle()].contains(&drone) {
                 return true;
             }
             conflict.to_s = conflict.to_s.min(start_s);
@@ -172,7 +189,7 @@ impl Monitor {
         let end = self.settings.plan_end.unwrap_or(PlanEnd::Hold);
         let plans = match &mut self.plans {
             Some(plans) => plans,
-            none => none.insert(PublishedPlans::new(self.settings.delta_m, end)?),
+            none => none.insert(PublishedPlans::new(self.settings.delta_m, end, plan.start_ns)?),
         };
         if plans.is_repeated(plan)? {
             return Ok(());
@@ -188,13 +205,18 @@ impl Monitor {
             self.fault(Fault::TooManyVehicles, None, *arrival_s);
             return Ok(());
         }
-        let found = plans.take(plan, start_s, now_s)?;
+        let planned_s = plan.start_ns.saturating_sub(plans.zero_ns) as f64 * 1e-9;
+        let published_s = planned_s - (start_s - now_s);
+        // With an inferred clock, a plan that seems to be late is judged from its start on.
+        let published_s = if clock == PlanClock::Machine { published_s.min(planned_s) } else { published_s };
+        let found = plans.take(plan, planned_s, published_s)?;
+        plans.offset_s = start_s - planned_s;
         if clock == PlanClock::Machine {
             plans.clock = clock;
         }
-        let at_s = now_s + self.shift_s;
+        let (at_s, shift_s) = (now_s + self.shift_s, self.shift_s + plans.offset_s);
         for conflict in found {
-            let conflict = later(conflict, self.shift_s);
+            let conflict = later(conflict, shift_s);
             self.emit(Event::PlanConflict { conflict, left_s: (conflict.from_s - at_s).max(0.0), at_s });
         }
         Ok(())
@@ -234,8 +256,9 @@ impl Monitor {
 
     /// Returns the conflict of plans with the earliest start that is not over, and forgets those that are.
     pub(super) fn plan_conflict(&mut self) -> Option<PlanConflict> {
-        let (now_s, shift_s) = (self.now_s - self.shift_s, self.shift_s);
         let plans = self.plans.as_mut()?;
+        let shift_s = self.shift_s + plans.offset_s;
+        let now_s = self.now_s - shift_s;
         plans.conflicts.retain(|conflict| conflict.to_s >= now_s);
         let first = plans.conflicts.iter().min_by(|a, b| a.from_s.total_cmp(&b.from_s))?;
         Some(later(*first, shift_s))
@@ -247,7 +270,10 @@ fn later(conflict: PlanConflict, shift_s: f64) -> PlanConflict {
     let reference = |plan: PlanReference| PlanReference { published_s: plan.published_s + shift_s, ..plan };
     PlanConflict {
         plan: reference(conflict.plan),
-        other: reference(conflict.other),
+        other: match conflict.other {
+            Counterpart::Plan(plan) => Counterpart::Plan(reference(plan)),
+            flight @ Counterpart::Flight(_) => flight,
+        },
         from_s: conflict.from_s + shift_s,
         to_s: conflict.to_s + shift_s,
         min_at_s: conflict.min_at_s.map(|at_s| at_s + shift_s),

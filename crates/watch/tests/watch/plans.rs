@@ -163,6 +163,80 @@ fn a_conflict_before_the_next_plan_starts_is_not_withdrawn() {
 }
 
 #[test]
+fn the_clock_of_positions_moves_no_plan_against_another() {
+    // The clock of planners and positions is 3 s ahead of this machine, or 3 s behind it.
+    for ahead_s in [3.0, -3.0, 0.0] {
+        for heard_before in 0..3 {
+            let mut monitor = monitor(settings());
+            let plans = [along(0.1), across(0.2, 0.0)];
+            for (number, plan) in plans.into_iter().enumerate() {
+                if number == heard_before {
+                    assert_eq!(heard(&mut monitor, 0.0), State::Clear);
+                }
+                let (arrival_s, arrival_ns) = (0.1 + 0.05 * number as f64, nanoseconds(0.1 - ahead_s));
+                let message = PlanMessage { topic: "/plans".to_owned(), plan, arrival_s, arrival_ns };
+                monitor.take_plan(&message).expect("a plan");
+            }
+            let found = conflicts(&mut monitor);
+            let [(Event::PlanConflict { conflict, .. }, ..)] = &found[..] else {
+                panic!("{ahead_s} {heard_before} {found:?}")
+            };
+            // The least distance is that of the two plans on one clock.
+            let least_m = (4.18_f64 - 4.1).hypot(2.0 * (4.18 - 4.2));
+            assert!((conflict.lower_m - least_m).abs() < 1e-5, "{ahead_s} {heard_before} {conflict:?}");
+        }
+    }
+}
+
+#[test]
+fn an_undecided_plan_is_announced() {
+    // The two pass each other at exactly 1 m, on curves.
+    let bent = |drone: i32, y_m: f64, sign: f64| {
+        let coefficients = |last: [f64; 2]| json!([0.0, 0.0, 0.0, last[0], last[1], 0.0]);
+        let mut message = line(drone, nanoseconds(0.1), [0.0; 3], [0.0; 3], 2.0);
+        message["coef_x"] = json!([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        message["coef_y"] = coefficients([sign * 0.25, -sign * 0.5]);
+        message["coef_y"][5] = json!(y_m + sign * 0.25);
+        live_plans(&message).expect("a plan").expect("a valid one").remove(0)
+    };
+    let judged = |gap_m: f64| {
+        let mut monitor = monitor(settings());
+        heard(&mut monitor, 0.0);
+        take(&mut monitor, bent(0, 0.0, -1.0), 0.1).expect("a plan");
+        take(&mut monitor, bent(1, gap_m, 1.0), 0.1).expect("a plan");
+        let found = conflicts(&mut monitor);
+        (found, heard(&mut monitor, 0.2))
+    };
+    let (found, state) = judged(1.0);
+    let [(Event::PlanConflict { conflict, .. }, json, text)] = &found[..] else { panic!("{found:?}") };
+    assert!(conflict.min_at_s.is_none() && conflict.lower_m < 1.0 && conflict.upper_m >= 1.0, "{conflict:?}");
+    assert!(text.contains(" may come to ") && json["min_at_s"].is_null(), "{text} {json}");
+    assert!(matches!(state, State::Undecided(Reason::PlanConflict(_))), "{state:?}");
+    // Negative twin.
+    let (found, state) = judged(1.001);
+    assert!(found.is_empty() && state == State::Clear, "{found:?} {state:?}");
+}
+
+#[test]
+fn an_old_plan_that_is_sent_again_replaces_none() {
+    let mut monitor = monitor(settings());
+    heard(&mut monitor, 0.0);
+    let stand = |k: u32| plan(0, 0.01 * f64::from(k), [0.0, f64::from(k % 7), 1.0], [0.0; 3], 100.0);
+    for k in 0..1100 {
+        take(&mut monitor, stand(k), 0.01 * f64::from(k)).expect("a plan");
+    }
+    // Among the newest plans it is a repetition; older ones are refused.
+    take(&mut monitor, stand(100), 11.0).expect("a repetition");
+    let error = take(&mut monitor, stand(50), 11.0).expect_err("forgotten");
+    assert!(matches!(error, Problem::WrongPlan(_)), "{error:?}");
+    assert_eq!(monitor.plan_counts(), Some([1100, 0]));
+    // The last plan is still valid.
+    let y_m = f64::from(1099 % 7);
+    take(&mut monitor, plan(1, 11.0, [0.5, y_m, 1.0], [0.0; 3], 1.0), 11.0).expect("a plan");
+    assert_eq!(conflicts(&mut monitor).len(), 1);
+}
+
+#[test]
 fn the_end_of_a_plan_is_that_of_the_settings() {
     // The first plan ends at the origin after 1 s; the second one passes there later.
     for (end, count, source) in [

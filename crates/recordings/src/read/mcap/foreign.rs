@@ -15,7 +15,7 @@ use super::super::time_unit::TimeUnit;
 use super::messages::{EARTH, Observation, PoseKind, VehicleKey, is_list, reader_of_topic};
 use super::outline::{Outline, is_static, place, space};
 use super::plan::{Conversion, ReadPlan};
-use super::planned;
+use super::planned::PlannerCurves;
 use super::split::SplitFiles;
 use super::tree::{FramePose, TransformAt};
 use crate::mcap::topic::{Message, Part};
@@ -23,10 +23,12 @@ use crate::mcap::topic::{Message, Part};
 /// Opens a recording in consecutive files; `whole` is the source named in errors.
 pub(super) fn open(whole: &Source, mut splits: SplitFiles, options: &ReadOptions) -> Result<Recording, ReadError> {
     let outline = Outline::of(&mut splits, &options.topics)?;
-    if let Some(curves) = planned::open(&outline, &mut splits, options)? {
-        return Ok(curves);
-    }
-    if options.plan_end.is_some() {
+    let has_poses = outline.pose_topics().any(|topic| options.topics.is_empty() || options.topics.contains(topic));
+    let curves = match PlannerCurves::read(&outline, &mut splits)? {
+        Some(curves) if !has_poses => return curves.flown(options, splits.notes.clone()),
+        curves => curves,
+    };
+    if options.plan_end.is_some() && curves.is_none() {
         return refuse(ContentKind::UnusedOption, "it has no plans of a planner", format!("omit {PLAN_END}"));
     }
     let plan = ReadPlan::of(outline, &mut splits, options)?;
@@ -36,7 +38,11 @@ pub(super) fn open(whole: &Source, mut splits: SplitFiles, options: &ReadOptions
     // Duplicates of messages indicate overlapping files and are refused by default.
     info.options.duplicates = options.duplicates.or(Some(Duplicates::Refuse));
     let foreign = ForeignRows { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
-    Ok(Box::new(Ordered::open(foreign, info)?))
+    let positions = Box::new(Ordered::open(foreign, info)?);
+    match curves {
+        Some(curves) => curves.beside(positions, options),
+        None => Ok(positions),
+    }
 }
 
 /// Rows of a foreign recording.

@@ -7,7 +7,7 @@
 //! | `foxglove.PosesInFrame`, `geometry_msgs/msg/PoseArray` | protobuf or json, cdr | its place in the list |
 //! | `foxglove.FrameTransform(s)`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/TransformStamped` | the same | the child frame |
 //! | `motion_capture_tracking_interfaces/msg/NamedPoseArray` | cdr | the name of the pose |
-//! | `traj_utils/msg/Bspline`, `traj_utils/msg/MINCOTraj`, `traj_utils/msg/PolyTraj` | cdr | the number of the drone |
+//! | `traj_utils/msg/Bspline`, `traj_utils/msg/MultiBsplines`, `traj_utils/msg/MINCOTraj`, `traj_utils/msg/PolyTraj` | cdr | the number of the drone |
 //! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped`, `PointStamped`, `nav_msgs/msg/Odometry`, `sensor_msgs/msg/NavSatFix` | the same | the topic |
 //!
 //! Times are the stamps of the messages, or the log times if no message has a stamp. All sources must have one clock.
@@ -98,7 +98,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let remedy = "record one of the topics foxglove.PosesInFrame, foxglove.FrameTransforms, \
                   geometry_msgs/msg/PoseStamped, geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, \
                   sensor_msgs/msg/NavSatFix, motion_capture_tracking_interfaces/msg/NamedPoseArray, \
-                  tf2_msgs/msg/TFMessage, traj_utils/msg/Bspline, traj_utils/msg/MINCOTraj or traj_utils/msg/PolyTraj";
+                  tf2_msgs/msg/TFMessage, traj_utils/msg/Bspline, traj_utils/msg/MultiBsplines, \
+                  traj_utils/msg/MINCOTraj or traj_utils/msg/PolyTraj";
     refuse(ContentKind::NoPositions, "it has no topic with positions", remedy)
 }
 

@@ -3,13 +3,14 @@
 //! JSON of a live source, which has no definitions, the fields decide.
 //!
 //! A curve of a drone is flown from its start until the next one of that drone starts. The whole curve is a published
-//! plan ([`Published`]). The trajectory server of the first version holds the last point of a curve. That of the second
+//! plan ([`Published`]). Beside topics of positions, these are the flight, and curves are plans alone. The trajectory server of the first version holds the last point of a curve. That of the second
 //! version sends nothing after the end: that the drone holds the last point is a default there.
 //!
 //! A B-spline has its degree in `order`, and its time 0 at the knot with this index. A MINCO trajectory of order 5 is
 //! the curve of least jerk through its points. A polynomial trajectory of order 5 has six coefficients of each piece,
 //! the highest power of the time since its start first.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
@@ -26,11 +27,11 @@ use super::definition::{CurveKind, curve_kind, fields};
 use super::messages::nanoseconds;
 use super::outline::Outline;
 use super::split::SplitFiles;
-use crate::mcap::topic::{CDR, DeclaredTopic, Part as FilePart, decode};
+use crate::mcap::topic::{CDR, DeclaredTopic, Part as FilePart, decode_whole};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::{CLOCK, DUPLICATES, FRAME, ORIGIN, PLAN_END, SORT, TOPIC};
 use tautline_core::text::counted;
-use tautline_core::track::{Clock, Item, Metadata, Piece, Plan as Published, PlanEnd};
+use tautline_core::track::{Clock, Item, Metadata, Piece, Plan as Published, PlanEnd, Tracks};
 
 /// Degree of the curves of EGO-Planner v2.
 const DEGREE: u8 = 5;
@@ -38,191 +39,347 @@ const DEGREE: u8 = 5;
 const NS_PER_S: i64 = 1_000_000_000;
 /// Largest time between the publication of a curve and its start, by which log times and starts have one clock \[ns\].
 const ONE_CLOCK_NS: i64 = 60 * NS_PER_S;
+/// Largest time from the start of a curve to its publication, if planners are in time \[ns\].
+const LATEST_NS: i64 = NS_PER_S;
+/// Largest time between two starts of one clock: 30 days \[ns\].
+const FARTHEST_STARTS_NS: u64 = 30 * 86_400 * NS_PER_S as u64;
 
 /// Returns the remedy for a curve that contradicts itself.
 fn replan() -> String {
     format!("check the planner and its version, and record again; or choose other topics with {TOPIC}")
 }
 
-/// Opens the curves of planners; `None` if the recording has none, or the user names other topics.
-pub(super) fn open(
-    outline: &Outline,
-    splits: &mut SplitFiles,
-    options: &ReadOptions,
-) -> Result<Option<Recording>, ReadError> {
-    let Some(topic) = outline.curves.first() else { return Ok(None) };
-    outline.refuse_unknown()?;
-    if let Some(other) = outline.pose_topics().find(|other| options.topics.is_empty() || options.topics.contains(other))
-    {
-        let problem = format!("topic {} holds curves of a planner, but {} positions", quoted(topic), quoted(other));
-        let remedy = format!("choose the topics of one kind with {TOPIC}");
-        return refuse(ContentKind::AmbiguousTopics, problem, remedy);
-    }
-    let unused = [
-        (options.frame.is_some(), FRAME, "curves of planners name no frame"),
-        (options.origin.is_some(), ORIGIN, "curves of planners have no place on the Earth"),
-        (options.clock.is_some(), CLOCK, "curves of planners have their own times of start"),
-        (options.sort, SORT, "curves of planners are sorted by their starts"),
-        (options.duplicates.is_some(), DUPLICATES, "curves of planners are no rows"),
-    ];
-    if let Some((_, option, why)) = unused.into_iter().find(|(is_given, ..)| *is_given) {
-        return refuse(ContentKind::UnusedOption, why, format!("omit {option}"));
-    }
-    let (mut drones, mut number) = (BTreeMap::<i32, BTreeMap<i64, Plan>>::new(), 0);
-    let (mut repeated, mut published, mut undefined) = (0, Vec::new(), BTreeSet::new());
-    splits.visit_all(|part| {
-        let FilePart::Message(message) = part else { return Ok(()) };
-        let Some(kind) = curve_kind(&message.of.schema, &message.of.definition) else { return Ok(()) };
-        if !outline.curves.contains(&message.of.topic) {
-            return Ok(());
-        }
-        number += 1;
-        let place = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
-        if message.of.definition.is_empty() {
-            undefined.insert(message.of.topic.clone());
-        }
-        let plans = Message::in_cdr(kind, message.of, message.bytes).and_then(Message::plans);
-        let plans = plans.map_err(|fault| fault.at(place()))?;
-        for (drone, plan) in plans {
-            let start_ns = plan.start_ns;
-            match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
-                None => published.push((i64::try_from(message.log_ns).unwrap_or(i64::MAX), drone, start_ns)),
-                Some(known) if known == plan => repeated += 1,
-                Some(_) => {
-                    let problem = format!("another curve of drone {drone} starts at {start_ns} ns");
-                    let remedy =
-                        format!("record each planner on a topic of its own, and choose the topics with {TOPIC}");
-                    return Err(Fault::content(ContentKind::DuplicateRow, problem, remedy).at(place()));
-                }
-            }
-        }
-        Ok(())
-    })?;
-    let first_ns = drones.values().flat_map(BTreeMap::keys).min().copied().unwrap_or(0);
-    let epoch_ns = first_ns.div_euclid(NS_PER_S).saturating_mul(NS_PER_S);
-    let mut notes = splits.notes.clone();
-    notes.push(format!(
-        "{} of planners of {}: each is judged until the next one of its drone starts",
-        counted(drones.values().map(|curves| curves.len() as u64).sum(), "curve", "curves"),
-        counted(drones.len() as u64, "drone", "drones")
-    ));
-    if !undefined.is_empty() {
-        let topics = undefined.iter().map(|topic| quoted(topic)).collect::<Vec<_>>().join(", ");
-        notes.push(format!("without definitions of messages, the names of schemas decide how they are read: {topics}"));
-    }
-    if repeated > 0 {
-        notes.push(format!(
-            "{} repeated with the same content, and read once",
-            counted(repeated, "curve is", "curves are")
-        ));
-    }
-    let end = options.plan_end.unwrap_or(PlanEnd::Hold);
-    let vehicles = vehicles(&drones, end, epoch_ns, options.metres(), &mut notes)?;
-    let clock = Clock { unit: "ns", epoch_ns, ..Clock::default() };
-    let mut facts = vec![
-        Fact::name(FactKind::Clock, fact::Source::Recorded, "times of start in messages"),
-        Fact::name(FactKind::Identity, fact::Source::Deduced, "numbers of drones in messages"),
-    ];
-    // Recorders write log times by their own clock, planners in simulations start by the simulated one.
-    let is_one_clock = published.iter().all(|(log_ns, _, start_ns)| log_ns.abs_diff(*start_ns) <= ONE_CLOCK_NS as u64);
-    facts.push(if is_one_clock {
-        Fact::name(FactKind::PlanPublication, fact::Source::Recorded, "their log times")
-    } else {
-        for (log_ns, _, start_ns) in &mut published {
-            *log_ns = *start_ns;
-        }
-        Fact::name(FactKind::PlanPublication, fact::Source::Default, "their starts")
-    });
-    let is_rule = drones.values().flat_map(BTreeMap::values).all(|plan| plan.is_held);
-    let source = match options.plan_end {
-        Some(_) => fact::Source::Declared,
-        None if is_rule => fact::Source::Convention,
-        None => fact::Source::Default,
-    };
-    facts.push(Fact::name(FactKind::PlanEnd, source, end.name()));
-    let plans = published_plans(&drones, published, epoch_ns, options.metres())?;
-    Ok(Some(Curves::with_plans(vehicles, Metadata { clock, facts, ..Metadata::in_seconds(notes) }, plans)))
+/// Curves of planners in a recording.
+pub(super) struct PlannerCurves {
+    /// Curves of each drone, by start \[ns\].
+    drones: BTreeMap<i32, BTreeMap<i64, Curve>>,
+    repeated: u64,
+    /// Topics without a definition of their messages.
+    undefined: BTreeSet<String>,
 }
 
-/// Returns the whole curves in order of publication, given as instants of publication, drones and starts \[ns\].
-fn published_plans(
-    drones: &BTreeMap<i32, BTreeMap<i64, Plan>>,
-    mut published: Vec<(i64, i32, i64)>,
-    epoch_ns: i64,
-    scale: f64,
-) -> Result<Vec<Published>, Fault> {
-    published.sort_unstable();
-    let indices: BTreeMap<i32, usize> = drones.keys().enumerate().map(|(vehicle, drone)| (*drone, vehicle)).collect();
-    let plan = |(published_ns, drone, start_ns): (i64, i32, i64)| {
-        let (vehicle, start_s) = (indices[&drone], seconds_since(epoch_ns, start_ns));
-        let pieces = drones[&drone][&start_ns].parts.iter().map(|(from_s, to_s, coefficients)| {
-            let (from_s, to_s) = (start_s + from_s, start_s + to_s);
-            piece(vehicle, from_s, to_s, coefficients.iter().copied(), scale).ok_or_else(Fault::out_of_range)
+/// Curve, with its first publication.
+struct Curve {
+    plan: Plan,
+    /// Smallest log time of its messages \[ns\].
+    log_ns: i64,
+    /// Number of this message in the recording, from 1.
+    number: u64,
+}
+
+impl PlannerCurves {
+    /// Reads the curves; `None` if the recording has none, or the user names other topics.
+    pub(super) fn read(outline: &Outline, splits: &mut SplitFiles) -> Result<Option<Self>, ReadError> {
+        if outline.curves.is_empty() {
+            return Ok(None);
+        }
+        outline.refuse_unknown()?;
+        let (mut drones, mut number) = (BTreeMap::<i32, BTreeMap<i64, Curve>>::new(), 0);
+        let (mut repeated, mut undefined) = (0, BTreeSet::new());
+        splits.visit_all(|part| {
+            let FilePart::Message(message) = part else { return Ok(()) };
+            if !outline.curves.contains(&message.of.topic) {
+                return Ok(());
+            }
+            let Some(kind) = curve_kind(&message.of.schema, &message.of.definition) else { return Ok(()) };
+            number += 1;
+            let place = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
+            if message.of.definition.is_empty() {
+                undefined.insert(message.of.topic.clone());
+            }
+            let plans = Message::in_cdr(kind, message.of, message.bytes).and_then(Message::plans);
+            let plans = plans.map_err(|fault| fault.at(place()))?;
+            let log_ns = i64::try_from(message.log_ns).unwrap_or(i64::MAX);
+            for (drone, plan) in plans {
+                let start_ns = plan.start_ns;
+                match drones.entry(drone).or_default().entry(start_ns) {
+                    Entry::Vacant(place) => drop(place.insert(Curve { plan, log_ns, number })),
+                    Entry::Occupied(mut known) if known.get().plan == plan => {
+                        repeated += 1;
+                        // The messages of a file may be in any order.
+                        if log_ns < known.get().log_ns {
+                            known.insert(Curve { plan, log_ns, number });
+                        }
+                    }
+                    Entry::Occupied(_) => {
+                        let problem = format!("another curve of drone {drone} starts at {start_ns} ns");
+                        let remedy =
+                            format!("record each planner on a topic of its own, and choose the topics with {TOPIC}");
+                        return Err(Fault::content(ContentKind::DuplicateRow, problem, remedy).at(place()));
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        let starts =
+            || drones.iter().flat_map(|(drone, curves)| curves.keys().map(move |start_ns| (*start_ns, *drone)));
+        if let Some(((first_ns, first), (last_ns, last))) = starts().min().zip(starts().max())
+            && first_ns.abs_diff(last_ns) > FARTHEST_STARTS_NS
+        {
+            let problem = format!(
+                "a curve of drone {first} starts at {first_ns} ns and one of drone {last} at {last_ns} ns, more than \
+                 30 days apart: the starts are of several clocks"
+            );
+            return refuse(ContentKind::SeveralClocks, problem, replan());
+        }
+        Ok(Some(Self { drones, repeated, undefined }))
+    }
+
+    /// Returns the recording of the curves, each flown until the next one of its drone starts.
+    pub(super) fn flown(self, options: &ReadOptions, mut notes: Vec<String>) -> Result<Recording, ReadError> {
+        let unused = [
+            (options.frame.is_some(), FRAME, "curves of planners name no frame"),
+            (options.origin.is_some(), ORIGIN, "curves of planners have no place on the Earth"),
+            (options.clock.is_some(), CLOCK, "curves of planners have their own times of start"),
+            (options.sort, SORT, "curves of planners are sorted by their starts"),
+            (options.duplicates.is_some(), DUPLICATES, "curves of planners are no rows"),
+        ];
+        if let Some((_, option, why)) = unused.into_iter().find(|(is_given, ..)| *is_given) {
+            return refuse(ContentKind::UnusedOption, why, format!("omit {option}"));
+        }
+        let first_ns = self.drones.values().flat_map(BTreeMap::keys).min().copied().unwrap_or(0);
+        let epoch_ns = first_ns.div_euclid(NS_PER_S).saturating_mul(NS_PER_S);
+        notes.push(format!("{}: each is judged until the next one of its drone starts", self.counts()));
+        notes.extend(self.notes());
+        let end = options.plan_end.unwrap_or(PlanEnd::Hold);
+        let vehicles = self.vehicles(end, epoch_ns, options.metres(), &mut notes)?;
+        let clock = Clock { unit: "ns", epoch_ns, ..Clock::default() };
+        let mut facts = vec![
+            Fact::name(FactKind::Clock, fact::Source::Recorded, "times of start in messages"),
+            Fact::name(FactKind::Identity, fact::Source::Deduced, "numbers of drones in messages"),
+        ];
+        facts.extend(self.facts(options));
+        let indices = self.drones.keys().enumerate().map(|(vehicle, drone)| (*drone, vehicle)).collect();
+        let plans = self.published_plans(&indices, epoch_ns, options.metres())?;
+        Ok(Curves::with_plans(vehicles, Metadata { clock, facts, ..Metadata::in_seconds(notes) }, plans))
+    }
+
+    /// Returns the recording of positions with the curves as plans of its vehicles.
+    pub(super) fn beside(self, positions: Recording, options: &ReadOptions) -> Result<Recording, ReadError> {
+        if positions.earth_origin().is_some() {
+            let problem = "its positions are places on the Earth, curves of planners are not";
+            return refuse(ContentKind::AmbiguousTopics, problem, one_kind());
+        }
+        let indices = self.drones.keys().map(|drone| Ok((*drone, vehicle_of(*drone, positions.vehicles())?)));
+        let indices = indices.collect::<Result<_, Fault>>()?;
+        let plans = self.published_plans(&indices, positions.clock().epoch_ns, options.metres())?;
+        let mut notes = vec![format!("{}, beside positions", self.counts())];
+        notes.extend(self.notes());
+        let mut facts = self.facts(options);
+        let of_numbers = "belong to the vehicles with their numbers in the names";
+        facts.push(Fact::name(FactKind::FlownPlans, fact::Source::Inferred, of_numbers));
+        let mut recording = PlannedFlights { positions, plans, notes, facts, metadata: Metadata::default() };
+        recording.refresh();
+        Ok(Box::new(recording))
+    }
+
+    /// Returns the numbers of curves and drones in words.
+    fn counts(&self) -> String {
+        let curves = self.drones.values().map(|curves| curves.len() as u64).sum();
+        let drones = counted(self.drones.len() as u64, "drone", "drones");
+        format!("{} of planners of {drones}", counted(curves, "curve", "curves"))
+    }
+
+    fn notes(&self) -> impl Iterator<Item = String> {
+        let topics = self.undefined.iter().map(|topic| quoted(topic)).collect::<Vec<_>>().join(", ");
+        let undefined =
+            format!("without definitions of messages, the names of schemas decide how they are read: {topics}");
+        let curves = counted(self.repeated, "curve is", "curves are");
+        let repeated = format!("{curves} repeated with the same content, and read once");
+        let undefined = (!self.undefined.is_empty()).then_some(undefined);
+        undefined.into_iter().chain((self.repeated > 0).then_some(repeated))
+    }
+
+    /// Returns the clock of log times and starts. Recorders write log times by their own clock, planners in simulations
+    /// start by the simulated one.
+    ///
+    /// The times from the publications of curves to their starts decide. With one clock some curve starts within a
+    /// minute, and some is published before its start or soon after it.
+    fn is_one_clock(&self) -> bool {
+        let leads = || self.drones.values().flatten().map(|(start_ns, curve)| start_ns.saturating_sub(curve.log_ns));
+        leads().any(|lead_ns| lead_ns.abs() <= ONE_CLOCK_NS) && leads().any(|lead_ns| lead_ns >= -LATEST_NS)
+    }
+
+    /// Returns the curves with instants of publication \[ns\] and drones, in order of publication.
+    fn in_order(&self) -> Vec<(i64, i32, &Plan)> {
+        let is_one_clock = self.is_one_clock();
+        let curves = self.drones.iter().flat_map(|(drone, curves)| curves.values().map(move |curve| (*drone, curve)));
+        let published = curves.map(|(drone, curve)| {
+            let published_ns = if is_one_clock { curve.log_ns } else { curve.plan.start_ns };
+            (published_ns, curve.number, drone, &curve.plan)
         });
-        let published_s = seconds_since(epoch_ns, published_ns);
-        Ok(Published { vehicle, published_s, pieces: pieces.collect::<Result<_, Fault>>()? })
+        let mut published: Vec<_> = published.collect();
+        published.sort_by_key(|(published_ns, number, drone, _)| (*published_ns, *number, *drone));
+        published.into_iter().map(|(published_ns, _, drone, plan)| (published_ns, drone, plan)).collect()
+    }
+
+    /// Returns the facts on the publication and on the ends of curves.
+    fn facts(&self, options: &ReadOptions) -> Vec<Fact> {
+        let (source, published) = if self.is_one_clock() {
+            (fact::Source::Recorded, "their log times")
+        } else {
+            (fact::Source::Default, "their starts")
+        };
+        let is_rule = self.drones.values().flat_map(BTreeMap::values).all(|curve| curve.plan.is_held);
+        let source_of_end = match options.plan_end {
+            Some(_) => fact::Source::Declared,
+            None if is_rule => fact::Source::Convention,
+            None => fact::Source::Default,
+        };
+        let end = options.plan_end.unwrap_or(PlanEnd::Hold);
+        vec![
+            Fact::name(FactKind::PlanPublication, source, published),
+            Fact::name(FactKind::PlanEnd, source_of_end, end.name()),
+        ]
+    }
+
+    /// Returns the published plans in order. `indices` are those of the vehicles of drones.
+    fn published_plans(
+        &self,
+        indices: &BTreeMap<i32, usize>,
+        epoch_ns: i64,
+        scale: f64,
+    ) -> Result<Vec<Published>, ReadError> {
+        let plan = |(published_ns, drone, plan): (i64, i32, &Plan)| {
+            let vehicle = indices[&drone];
+            let pieces = plan.pieces(drone, vehicle, epoch_ns, scale, f64::INFINITY)?;
+            Ok(Published { vehicle, published_s: seconds_since(epoch_ns, published_ns), pieces })
+        };
+        self.in_order().into_iter().map(plan).collect()
+    }
+
+    /// Returns the names and the flown pieces of all drones, and adds a note on the ends of curves.
+    ///
+    /// In order of publication, a curve replaces the earlier curves of its drone from its start on. Earlier ones that
+    /// would start then or later are not flown.
+    fn vehicles(
+        &self,
+        end: PlanEnd,
+        epoch_ns: i64,
+        scale: f64,
+        notes: &mut Vec<String>,
+    ) -> Result<VehicleItems, ReadError> {
+        let mut flown: BTreeMap<i32, BTreeMap<i64, &Plan>> = BTreeMap::new();
+        for (_, drone, plan) in self.in_order() {
+            let plans = flown.entry(drone).or_default();
+            plans.split_off(&plan.start_ns);
+            plans.insert(plan.start_ns, plan);
+        }
+        let curves = || flown.values().flat_map(BTreeMap::values);
+        let end_s = |plan: &Plan| seconds_since(epoch_ns, plan.start_ns) + plan.duration_s();
+        let last_s = curves().map(|plan| end_s(plan)).fold(f64::NEG_INFINITY, f64::max);
+        let (mut ended, mut vehicles) = (0, Vec::new());
+        for (vehicle, (drone, plans)) in flown.iter().enumerate() {
+            let mut items = Vec::new();
+            for (start_ns, plan) in plans {
+                let next = plans.range(start_ns.saturating_add(1)..).next();
+                let until_s = next.map_or(f64::INFINITY, |(next_ns, _)| seconds_since(epoch_ns, *next_ns));
+                items.extend(plan.pieces(*drone, vehicle, epoch_ns, scale, until_s)?.into_iter().map(Item::Piece));
+                let (stop_s, until_s) = (end_s(plan), until_s.min(last_s));
+                if stop_s < until_s {
+                    ended += 1;
+                    let [position, velocity] = plan.last();
+                    let coefficients = match end {
+                        PlanEnd::Hold => vec![position],
+                        PlanEnd::Continue => vec![position, velocity],
+                        PlanEnd::Unknown => continue,
+                    };
+                    let after = piece(vehicle, stop_s, until_s, coefficients, scale);
+                    items.push(Item::Piece(after.ok_or_else(|| Fault::out_of_range().at(plan.place(*drone)))?));
+                }
+            }
+            vehicles.push((drone.to_string(), items));
+        }
+        if ended > 0 {
+            let ends = counted(ended, "curve ends", "curves end");
+            let then = match end {
+                PlanEnd::Hold => "the drone holds the last point",
+                PlanEnd::Continue => "the drone flies on with its last velocity",
+                PlanEnd::Unknown => "the motion after the end is not known",
+            };
+            notes.push(format!("{ends} before the next one or the recording: {then} ({PLAN_END})"));
+        }
+        let dropped = self.drones.values().map(BTreeMap::len).sum::<usize>() - curves().count();
+        if dropped > 0 {
+            let dropped = counted(dropped as u64, "curve is", "curves are");
+            notes.push(format!("{dropped} not flown: a later message has an earlier start"));
+        }
+        Ok(vehicles)
+    }
+}
+
+/// Returns the remedy for curves and positions that do not belong together.
+fn one_kind() -> String {
+    format!("choose the topics of curves or those of positions with {TOPIC}")
+}
+
+/// Returns the vehicle whose name has the number of a drone. A number in the names of all vehicles does not count.
+fn vehicle_of(drone: i32, names: &[String]) -> Result<usize, Fault> {
+    let numbers = |name: &String| -> BTreeSet<u64> {
+        name.split(|c: char| !c.is_ascii_digit()).filter_map(|digits| digits.parse().ok()).collect()
     };
-    published.into_iter().map(plan).collect()
+    let all: Vec<_> = names.iter().map(numbers).collect();
+    let is_common = |number: &u64| all.len() > 1 && all.iter().all(|numbers| numbers.contains(number));
+    let has = |numbers: &BTreeSet<u64>| {
+        numbers.iter().any(|number| i64::try_from(*number) == Ok(drone.into()) && !is_common(number))
+    };
+    let mut found = all.iter().enumerate().filter(|(_, numbers)| has(numbers)).map(|(index, _)| index);
+    let problem = match (found.next(), found.next()) {
+        (Some(vehicle), None) => return Ok(vehicle),
+        (Some(first), Some(second)) => {
+            let (first, second) = (quoted(&names[first]), quoted(&names[second]));
+            format!("curves are of drone {drone}, a number in the names of both {first} and {second}")
+        }
+        _ => {
+            format!("curves are of drone {drone}, but no vehicle with positions has this number: {}", names.join(", "))
+        }
+    };
+    refuse(ContentKind::AmbiguousTopics, problem, one_kind())
+}
+
+/// Positions of vehicles, and their published plans.
+struct PlannedFlights {
+    positions: Recording,
+    plans: Vec<Published>,
+    notes: Vec<String>,
+    facts: Vec<Fact>,
+    /// Metadata of the positions so far, with the notes and the facts above.
+    metadata: Metadata,
+}
+
+impl PlannedFlights {
+    fn refresh(&mut self) {
+        self.metadata = self.positions.metadata().clone();
+        self.metadata.notes.extend_from_slice(&self.notes);
+        self.metadata.facts.extend_from_slice(&self.facts);
+    }
+}
+
+impl Tracks for PlannedFlights {
+    type Error = ReadError;
+
+    fn vehicles(&self) -> &[String] {
+        self.positions.vehicles()
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        let more = self.positions.read(items);
+        self.refresh();
+        more
+    }
+
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    fn plans(&self) -> &[Published] {
+        &self.plans
+    }
 }
 
 /// Returns the time since the epoch \[s\]. Both times are close, so that the difference in nanoseconds is exact.
 fn seconds_since(epoch_ns: i64, time_ns: i64) -> f64 {
     time_ns.saturating_sub(epoch_ns) as f64 / NS_PER_S as f64
-}
-
-/// Returns the names and the pieces of all drones, and adds notes on the ends of curves.
-fn vehicles(
-    drones: &BTreeMap<i32, BTreeMap<i64, Plan>>,
-    end: PlanEnd,
-    epoch_ns: i64,
-    scale: f64,
-    notes: &mut Vec<String>,
-) -> Result<VehicleItems, Fault> {
-    let seconds = |ns: i64| seconds_since(epoch_ns, ns);
-    let ends_s = drones.values().flatten().map(|(start_ns, plan)| seconds(*start_ns) + plan.duration_s());
-    let end_s = ends_s.fold(f64::NEG_INFINITY, f64::max);
-    let mut ended = 0;
-    let mut vehicles = Vec::new();
-    for (vehicle, (drone, plans)) in drones.iter().enumerate() {
-        let mut items = Vec::new();
-        for (start_ns, plan) in plans {
-            let start_s = seconds(*start_ns);
-            let next = plans.range(start_ns.saturating_add(1)..).next();
-            let until_s = next.map_or(f64::INFINITY, |(next_ns, _)| seconds(*next_ns));
-            let mut push = |from_s: f64, to_s: f64, coefficients: Vec<Vector3<f64>>| {
-                let piece = piece(vehicle, from_s, to_s, coefficients, scale).ok_or_else(Fault::out_of_range)?;
-                items.push(Item::Piece(piece));
-                Ok::<_, Fault>(())
-            };
-            for (from_s, to_s, coefficients) in &plan.parts {
-                let (from_s, to_s) = (start_s + from_s, (start_s + to_s).min(until_s));
-                if from_s < until_s {
-                    push(from_s, to_s, coefficients.clone())?;
-                }
-            }
-            let (stop_s, until_s) = (start_s + plan.duration_s(), until_s.min(end_s));
-            if stop_s < until_s {
-                ended += 1;
-                let [position, velocity] = plan.last();
-                match end {
-                    PlanEnd::Hold => push(stop_s, until_s, vec![position])?,
-                    PlanEnd::Continue => push(stop_s, until_s, vec![position, velocity])?,
-                    PlanEnd::Unknown => {}
-                }
-            }
-        }
-        vehicles.push((drone.to_string(), items));
-    }
-    if ended > 0 {
-        let ends = counted(ended, "curve ends", "curves end");
-        let then = match end {
-            PlanEnd::Hold => "the drone holds the last point",
-            PlanEnd::Continue => "the drone flies on with its last velocity",
-            PlanEnd::Unknown => "the motion after the end is not known",
-        };
-        notes.push(format!("{ends} before the next one or the recording: {then} ({PLAN_END})"));
-    }
-    Ok(vehicles)
 }
 
 /// Curve of a planner.
@@ -238,6 +395,30 @@ struct Plan {
 impl Plan {
     fn duration_s(&self) -> f64 {
         self.parts.last().map_or(0.0, |part| part.1)
+    }
+
+    /// Returns the pieces up to an instant \[s\]. A part that vanishes in the rounding of times is left out.
+    fn pieces(
+        &self,
+        drone: i32,
+        vehicle: usize,
+        epoch_ns: i64,
+        scale: f64,
+        until_s: f64,
+    ) -> Result<Vec<Piece>, ReadError> {
+        let start_s = seconds_since(epoch_ns, self.start_ns);
+        let parts =
+            self.parts.iter().map(|(from_s, to_s, coefficients)| (start_s + from_s, start_s + to_s, coefficients));
+        let parts = parts.filter(|(from_s, to_s, _)| *from_s < until_s && from_s != to_s);
+        let pieces = parts.map(|(from_s, to_s, coefficients)| {
+            piece(vehicle, from_s, to_s.min(until_s), coefficients.iter().copied(), scale)
+                .ok_or_else(Fault::out_of_range)
+        });
+        pieces.collect::<Result<_, Fault>>().map_err(|fault| fault.at(self.place(drone)))
+    }
+
+    fn place(&self, drone: i32) -> Place {
+        Place::Part(format!("the curve of drone {drone} that starts at {} ns", self.start_ns))
     }
 
     /// Returns position and velocity at the end.
@@ -381,7 +562,7 @@ fn decoded<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, Fault
     if encoding != CDR {
         return Err(Fault::damaged("ROS 2 messages are supported in CDR only".to_owned()));
     }
-    decode(bytes).map_err(Fault::damaged)
+    decode_whole(bytes).map_err(Fault::damaged)
 }
 
 fn refuse_not_finite(name: &str, numbers: &[f64]) -> Result<(), Fault> {
@@ -412,7 +593,7 @@ impl Message {
             CurveKind::Minco => decoded(encoding, bytes).map(Self::Minco),
             CurveKind::Polynomials => decoded(encoding, bytes).map(Self::Polynomials),
             CurveKind::Unsupported => {
-                let found = fields(&topic.definition).replace('\n', ", ");
+                let found = fields(&topic.schema, &topic.definition).replace('\n', ", ");
                 let problem = format!("the definition of {} has other fields: {found}", quoted(&topic.schema));
                 refuse(ContentKind::UnsupportedFormat, problem, replan())
             }

@@ -7,8 +7,9 @@ use crate::report::answer::{Answer, Detectors, Finding, FindingList, Judgement, 
 use crate::report::flight::{SCHEMA_VERSION, finite};
 use tautline_audit::envelope::{self, Corner, Exceedance, LimitOutcome};
 use tautline_audit::recorded::{
-    Absence, Contradiction, ExemptTime, Gap, ObjectPair, Outcome, PlanConflict, PlanReference, PlansOutcome, Presence,
-    Settings, TOUCHING_CYLINDER, TOUCHING_ELLIPSOIDS, WellClearLoss, WellClearOutcome,
+    Absence, Contradiction, Counterpart, ExemptTime, Gap, ObjectPair, Outcome, PlanApproach, PlanConflict,
+    PlanReference, PlanSeparations, PlansOutcome, Presence, Settings, TOUCHING_CYLINDER, TOUCHING_ELLIPSOIDS,
+    TrackingError, WellClearLoss, WellClearOutcome,
 };
 use tautline_audit::{Status, Tally};
 use tautline_core::fact::{BOUNDED, Fact, FactKind, RUN_AUDIT, Source as FactSource};
@@ -303,23 +304,33 @@ impl RecordedReport {
         self
     }
 
-    /// Returns the report with the findings between published plans. Its status is the worse of the two.
+    /// Returns the report with the findings on published plans. Its status is the worst of all.
     #[must_use]
     pub fn with_published_plans(mut self, found: &PlansOutcome) -> Self {
         let unit = self.unit();
-        let name = |plan: PlanReference| self.vehicles.get(plan.vehicle).cloned().unwrap_or_default();
-        let conflict = |found: &PlanConflict| Finding::plan_conflict(found, [found.plan, found.other].map(name), unit);
-        let closest = found.closest.iter();
-        let closest =
-            closest.map(|found| Finding::plan_approach(found, [found.plan, found.other].map(name), unit)).collect();
-        let answer = Answer {
-            closest,
+        let names = |plan: PlanReference, other: Counterpart| {
+            [plan.vehicle, other.vehicle()].map(|vehicle| self.vehicles.get(vehicle).cloned().unwrap_or_default())
+        };
+        let conflict = |found: &PlanConflict| Finding::plan_conflict(found, names(found.plan, found.other), unit);
+        let approach = |found: &PlanApproach| Finding::plan_approach(found, names(found.plan, found.other), unit);
+        let answer = |part, found: &PlanSeparations| Answer {
+            closest: found.closest.iter().map(approach).collect(),
             violations: FindingList::new(found.violations_tally, found.violations.iter().map(conflict).collect()),
             undecided: FindingList::new(found.undecided_tally, found.undecided.iter().map(conflict).collect()),
-            ..Answer::new(Part::PublishedPlans, found.status)
+            ..Answer::new(part, found.status)
         };
-        self.status = self.status.and(found.status);
-        self.answers.push(answer);
+        // Beside flights, plans of a single vehicle are compared with flights alone.
+        let has_others = found.published.comparisons > 0 || found.flown.is_none();
+        let mut answers: Vec<_> =
+            has_others.then(|| answer(Part::PublishedPlans, &found.published)).into_iter().collect();
+        answers.extend(found.flown.iter().map(|found| answer(Part::FlownPlans, found)));
+        let tracking_error = found.tracking_error.map(|TrackingError { plan, distance_m, .. }| {
+            let name = self.vehicles.get(plan.vehicle).cloned().unwrap_or_default();
+            Fact::number(FactKind::TrackingError, FactSource::Observed, distance_m, "m").about(name)
+        });
+        self.status = answers.iter().fold(self.status, |status, answer| status.and(answer.status));
+        self.answers.append(&mut answers);
+        self.source.facts.extend(tracking_error);
         self
     }
 

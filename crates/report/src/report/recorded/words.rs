@@ -1,5 +1,7 @@
 //! The report on a recording in words and as a page.
 
+use std::iter;
+
 use super::plan::PlanReport;
 use super::report::{Corners, EarlyEnd, Exemption, PresenceSpan, RecordedReport, RunObjection, VehicleFinding};
 use crate::figures::Figure;
@@ -173,6 +175,11 @@ impl RecordedReport {
             Part::Separation => Some(self.finding_of_pairs(answer, status)),
             Part::Plan => self.plan.as_ref().map(|plan| plan.brief_as(status)),
             Part::Presence => None,
+            // A clear verdict names its assumptions.
+            Part::PublishedPlans | Part::FlownPlans if status != Status::Clear => {
+                let assumed = self.clauses(|fact| is_of_published_plan(fact) && fact.is_assumption());
+                Some(iter::once(answer.brief_as(status)).chain(assumed).collect::<Vec<_>>().join(", "))
+            }
             _ => Some(answer.brief_as(status)),
         });
         let found: Vec<_> = found.collect();
@@ -310,8 +317,9 @@ impl RecordedReport {
         let answers = || self.answers.iter().filter(|answer| answer.part != Part::Plan);
         let [violations, undecided] = lists(answers);
         let closest = |is_of_obstacle| self.separation().map(|answer| closest_table(answer, is_of_obstacle));
-        let of_published = self.answers.iter().filter(|answer| answer.part == Part::PublishedPlans);
-        let of_published = of_published.map(|answer| closest_table(answer, false));
+        let of_plans =
+            self.answers.iter().filter(|answer| matches!(answer.part, Part::PublishedPlans | Part::FlownPlans));
+        let of_plans = of_plans.map(|answer| closest_table(answer, false));
         let sections = [
             Section::table("Each vehicle by itself", "limits, and the vehicles closest to them", columns, limits),
             Section::list(
@@ -330,12 +338,7 @@ impl RecordedReport {
         ];
         let against_plan = self.plan.iter().flat_map(PlanReport::sections);
         let closest = [closest(false), closest(true)].into_iter().flatten();
-        closest
-            .chain(of_published)
-            .chain(sections)
-            .chain(against_plan)
-            .filter(|section| !section.rows.is_empty())
-            .collect()
+        closest.chain(of_plans).chain(sections).chain(against_plan).filter(|section| !section.rows.is_empty()).collect()
     }
 
     /// Returns the lists that are cut, a sentence each.
@@ -349,6 +352,9 @@ impl RecordedReport {
                 Part::WellClear(_) => ["losses of well clear", "undecided times of well clear"].map(str::to_owned),
                 Part::PublishedPlans => {
                     ["violations of published plans", "undecided times of published plans"].map(str::to_owned)
+                }
+                Part::FlownPlans => {
+                    ["violations of plans and flights", "undecided times of plans and flights"].map(str::to_owned)
                 }
                 _ => ["violations", "undecided times"].map(str::to_owned),
             };
@@ -377,7 +383,7 @@ impl RecordedReport {
             self.detectors.pairs_swept
         );
         let lines = self.sections().into_iter().flat_map(|section| section.text(LISTED_IN_WORDS));
-        std::iter::once(judged).chain(lines).map(|line| one_line(&line) + "\n").collect()
+        iter::once(judged).chain(lines).map(|line| one_line(&line) + "\n").collect()
     }
 
     /// Returns the report as a self-contained HTML page, with the replay of the recording or the reason for its
@@ -439,6 +445,11 @@ fn is_of_part(fact: &Fact) -> bool {
             | FactKind::PlanPlane
     ) || is_of_plan(fact)
         || fact.kind == FactKind::Motion && fact.subject.is_some()
+}
+
+/// Returns whether a fact is about the plans of planners.
+fn is_of_published_plan(fact: &Fact) -> bool {
+    matches!(fact.kind, FactKind::PlanEnd | FactKind::PlanPublication | FactKind::FlownPlans)
 }
 
 /// Returns whether a fact is about the samples of the plan.

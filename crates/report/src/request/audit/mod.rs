@@ -210,7 +210,7 @@ impl ConfiguredAudit<'_> {
         if clock.inferred && facts.iter().all(|fact| fact.kind != FactKind::TimeUnit) {
             facts.push(Fact::name(FactKind::TimeUnit, FactSource::Inferred, &clock.unit));
         }
-        let plans = request.judge_plans(recording.as_ref(), &settings, &outcome, monitor)?;
+        let plans = request.judge_plans(recording.as_ref(), &settings, &outcome, !curves, monitor)?;
         let notes = recording.notes().to_vec();
         request.check_count(&outcome, &settings)?;
         side_files.check(&settings, &outcome)?;
