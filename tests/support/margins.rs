@@ -16,14 +16,14 @@ struct Row {
 }
 
 const ROWS: [Row; 7] = [
-    Row::of("all that a vehicle knows is old", "sensing.latency_s", [0.0, 1.0]),
-    Row::of("what it hears of others is old", "network.latency_s", [0.0, 4.0]).with(&["network.rate_hz=50"]),
+    Row::of("own and received states are late", "sensing.latency_s", [0.0, 1.0]),
+    Row::of("received states are late", "network.latency_s", [0.0, 4.0]).with(&["network.rate_hz=50"]),
     Row::of("messages are lost, twenty in a row", "network.loss", [0.0, 0.95])
         .with(&["network.rate_hz=50", "network.loss_burst=20"])
         .runs(3),
     Row::of("commands are held", "time.control_hz", [100.0, 0.25]).by_ratio(),
     Row::of("acceleration is limited", "actuation.max_accel_m_s2", [1.0, 0.002]).by_ratio(),
-    Row::of("places are measured with noise", "sensing.position_noise_m", [1e-4, 0.4])
+    Row::of("positions are measured with noise", "sensing.position_noise_m", [1e-4, 0.4])
         .with(&["sensing.rate_hz=100"])
         .by_ratio()
         .runs(3),
