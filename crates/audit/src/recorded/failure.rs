@@ -73,8 +73,7 @@ impl From<RecordedError> for Failure {
                 ("audit/radius-changes", message, help)
             }
             RecordedError::ExchangedFlights { .. } => {
-                let help = format!("judge plans and positions apart with {}", TOPIC.set("NAME"));
-                ("audit/exchanged-flights", message, help)
+                ("audit/exchanged-flights", message, format!("judge plans or positions alone with {TOPIC}"))
             }
             RecordedError::ObstaclesAndEllipsoid => {
                 let help = format!("judge obstacles by {DELTA} or {RADIUS}, and ellipsoids without them");
@@ -89,8 +88,7 @@ impl From<RecordedError> for Failure {
                 ("audit/well-clear", message, help)
             }
             RecordedError::WellClearAndEllipsoid => {
-                let help = format!("leave {ELLIPSOID} or {WELL_CLEAR} out");
-                ("audit/well-clear", message, help)
+                ("audit/well-clear", message, format!("leave {ELLIPSOID} or {WELL_CLEAR} out"))
             }
             RecordedError::Obstacle(_) => ("audit/obstacle", message, "correct the obstacle file".to_owned()),
             RecordedError::TwoClocks { .. } => {

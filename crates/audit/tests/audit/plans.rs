@@ -1,5 +1,7 @@
 //! Published plans: each against the plans that were valid at its publication.
 
+use std::slice;
+
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use tautline_audit::Status;
@@ -203,13 +205,13 @@ fn a_plan_through_a_vehicle_without_plans_is_found() {
     let ahead = along_x(0, 0.0, 0.0, 10.0, 0.0, 0.0);
     let own = flight(0, 10, |time_s| [time_s, 0.0, 1.0]);
     let hovers = |y| flight(1, 10, move |_| [5.0, y, 1.0]);
-    let found = flown(&delta, &[ahead.clone()], &[own.clone(), hovers(0.2)]);
+    let found = flown(&delta, slice::from_ref(&ahead), &[own.clone(), hovers(0.2)]);
     assert_eq!((found.status, found.comparisons, found.violations.len()), (Status::Violation, 1, 1));
     let violation = &found.violations[0];
     assert_eq!((violation.plan.number, violation.other), (1, Counterpart::Flight(1)));
     assert!((violation.upper_m - 0.2).abs() < 1e-9 && violation.min_at_s.is_some_and(|at_s| (at_s - 5.0).abs() < 1e-6));
     // Negative twins: the vehicle hovers 1 m aside, or the plan is replaced before it comes close.
-    let found = flown(&delta, &[ahead.clone()], &[own.clone(), hovers(1.0)]);
+    let found = flown(&delta, slice::from_ref(&ahead), &[own.clone(), hovers(1.0)]);
     assert_eq!(found.status, Status::Clear);
     assert!((found.closest[0].approach.lower_m - 1.0).abs() < 1e-9, "{:?}", found.closest);
     let stop = plan(0, 3.0, &[(3.0, 4.0)], &[[3.0, 0.0, 1.0], [0.0; 3]]);
@@ -361,7 +363,7 @@ proptest! {
         }).collect();
         // The flights have a corner each second, and are straight between.
         let place = |vehicle: usize, time_s: f64| {
-            let before = (time_s.floor() as usize).min(3);
+            let before = (0..4).rfind(|k| *k as f64 <= time_s).unwrap_or(0);
             let [from, to] = [before, before + 1].map(|k| Vector3::from(corners[vehicle][k]));
             from + (to - from) * (time_s - before as f64)
         };
