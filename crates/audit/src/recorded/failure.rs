@@ -75,17 +75,19 @@ impl From<RecordedError> for Failure {
             RecordedError::ExchangedFlights { .. } => {
                 ("audit/exchanged-flights", message, format!("judge plans or positions alone with {TOPIC}"))
             }
-            RecordedError::ObstaclesAndEllipsoid => {
-                let help = format!("judge obstacles by {DELTA} or {RADIUS}, and ellipsoids without them");
-                ("audit/obstacles-and-ellipsoid", message, help)
+            RecordedError::OffsetOfPlans { .. } => {
+                ("audit/offset-of-plans", message, format!("omit {OFFSET}, or judge positions alone with {TOPIC}"))
             }
+            RecordedError::ObstaclesAndEllipsoid => (
+                "audit/obstacles-and-ellipsoid",
+                message,
+                format!("judge obstacles by {DELTA} or {RADIUS}, and ellipsoids without them"),
+            ),
             RecordedError::CylinderAnd { other } => {
-                let help = format!("leave {CYLINDER} or {other} out");
-                ("audit/cylinder", message, help)
+                ("audit/cylinder", message, format!("leave {CYLINDER} or {other} out"))
             }
             RecordedError::WellClearMotion { .. } => {
-                let help = format!("give {}, or leave {MOTION} out", MOTION.set("linear"));
-                ("audit/well-clear", message, help)
+                ("audit/well-clear", message, format!("give {}, or leave {MOTION} out", MOTION.set("linear")))
             }
             RecordedError::WellClearAndEllipsoid => {
                 ("audit/well-clear", message, format!("leave {ELLIPSOID} or {WELL_CLEAR} out"))

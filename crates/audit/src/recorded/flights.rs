@@ -81,11 +81,12 @@ impl Flights {
         self.vehicles.get(vehicle)?.segments.last().map(|last| last.to_s)
     }
 
-    /// Returns the position at an instant; `None` if it is not known.
+    /// Returns the position at an instant, after a jump; `None` if it is not known.
     pub(super) fn position(&self, vehicle: usize, time_s: f64) -> Option<Vector3<f64>> {
         let segments = &self.vehicles.get(vehicle)?.segments;
-        let segment = segments.get(segments.partition_point(|segment| segment.to_s < time_s))?;
-        (segment.from_s <= time_s).then(|| segment.position(time_s))
+        let begun = segments.partition_point(|segment| segment.from_s <= time_s);
+        let segment = segments.get(begun.checked_sub(1)?).filter(|segment| time_s <= segment.to_s)?;
+        Some(if time_s < segment.to_s { segment.position(time_s) } else { segment.to })
     }
 
     /// Returns the part of a flight in a window; `None` if the vehicle is not present.
@@ -113,7 +114,11 @@ impl Flights {
         let all = self.vehicles.get(vehicle).map_or(&[][..], |vehicle| &vehicle.segments);
         let start = all.partition_point(|segment| segment.to_s < window.from_s);
         let segments = all[start..].iter().take_while(move |segment| segment.from_s <= window.to_s);
-        let ends = segments.flat_map(|segment| [segment.from_s, segment.to_s]);
+        // The ground may split the motion between two positions.
+        let ends = segments.flat_map(|segment| match segment.curve() {
+            Some(curve) => [curve.from_s, curve.to_s],
+            None => [segment.line().from_s, segment.line().to_s],
+        });
         ends.filter(move |time_s| (window.from_s..=window.to_s).contains(time_s))
     }
 

@@ -133,7 +133,7 @@ pub(super) struct Comparisons {
     is_exact: bool,
     count: u64,
     /// Whether a motion is unknown during a comparison.
-    pub(super) has_gap: bool,
+    pub(super) has_unknown: bool,
     results: Results,
     /// Plan and counterpart of the closest approaches.
     closest: BTreeMap<Pair, (PlanReference, Counterpart)>,
@@ -151,7 +151,7 @@ impl Comparisons {
             limits,
             is_exact,
             count: 0,
-            has_gap: false,
+            has_unknown: false,
             results: Results::default(),
             closest: BTreeMap::new(),
             violations: Shortlist::new(LISTED),
@@ -174,11 +174,11 @@ impl Comparisons {
         self.results.interruption.is_set()
     }
 
-    /// Returns the limit of two vehicles, and a bound per axis on the distance within which two motions must be swept.
+    /// Returns the distance within which the motions of two vehicles must be swept.
     pub(super) fn reach_m(&self, pair: Pair, radii_m: [f64; 2]) -> f64 {
         let limit_m = self.limits.of_vehicles(radii_m[0], radii_m[1]);
         let cutoff = self.results.closest.cutoff(ObjectPair::Vehicles(pair), limit_m);
-        self.limits.reach_m(limit_m.max(cutoff)).max()
+        self.limits.farthest_m(limit_m.max(cutoff))
     }
 
     /// Counts the comparison of two motions in a window. Returns `false` without a time at which one of them is above
@@ -284,7 +284,7 @@ impl Comparisons {
     /// Returns the verdict over all comparisons.
     pub(super) fn finish(self) -> PlanSeparations {
         let [violations, undecided] = [self.violations, self.undecided].map(Shortlist::into_list);
-        let is_decided = self.count > 0 && undecided.is_empty() && self.disagreements == 0 && !self.has_gap;
+        let is_decided = self.count > 0 && undecided.is_empty() && self.disagreements == 0 && !self.has_unknown;
         let tally = |count, listed| Tally { count, listed, is_exact: self.are_counts_exact };
         let closest = self.results.closest.kept.iter().filter_map(|approach| {
             let (plan, other) = *self.closest.get(&approach.pair.vehicles()?)?;

@@ -129,7 +129,8 @@ pub struct PlanApproach {
 /// Separations of plans from other plans, or from flights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSeparations {
-    /// Verdict. It is undecided if nothing was compared, or if the motion of a flight is unknown during a comparison.
+    /// Verdict. It is undecided if nothing was compared, if the motion of a flight is unknown during a comparison, or if a
+    /// vehicle is farther than its limit from its plan when it begins to fly the plan.
     pub status: Status,
     /// Number of comparisons of a plan with a plan, or with a flight. A comparison of two vehicles that are on the ground
     /// throughout does not count.
@@ -246,13 +247,16 @@ pub struct PlanAuditor {
 }
 
 impl PlanAuditor {
-    /// Creates an auditor with the limits on separations, ends of the judged time, offsets and selected vehicles of
-    /// these settings.
+    /// Creates an auditor with the limits on separations, ends of the judged time and selected vehicles of these
+    /// settings.
     ///
     /// # Errors
-    /// [`RecordedError`] if a number of the settings is out of range.
+    /// [`RecordedError`] if a number of the settings is out of range, or a vehicle has a clock offset.
     pub fn new(settings: Settings, end: PlanEnd) -> Result<Self, RecordedError> {
         settings.check()?;
+        if let Some((name, _)) = settings.vehicles.iter().find(|(_, vehicle)| vehicle.offset_s != 0.0) {
+            return Err(RecordedError::OffsetOfPlans { vehicle: name.clone() });
+        }
         Ok(Self {
             published: Comparisons::new(settings.limits(), true),
             judged: settings.window(),
@@ -422,6 +426,8 @@ impl PlanAuditor {
             let mut plans = mem::take(&mut self.past);
             plans.extend(mem::take(&mut self.fleet).into_iter().flatten());
             plans.sort_by(|a, b| a.reference.published_s.total_cmp(&b.reference.published_s));
+            // Plans that were replaced before their start are not flown.
+            plans.retain(|plan| plan.flown().from_s < plan.flown().to_s);
             self.refuse_exchanged(&flights, &plans)?;
             flown = Some(self.compare_with_flights(&flights, &plans)?);
             tracking_error = self.tracking_error(&flights, &plans);
@@ -434,8 +440,9 @@ impl PlanAuditor {
     fn compare_with_flights(&self, flights: &Flights, plans: &[Known]) -> Result<PlanSeparations, RecordedError> {
         let mut comparisons = Comparisons::new(self.settings.limits(), flights.are_exact());
         comparisons.set_interruption(self.published.interruption());
-        comparisons.has_gap = flights.has_contradiction();
+        comparisons.has_unknown = flights.has_contradiction();
         for plan in plans {
+            comparisons.has_unknown |= self.is_astray(flights, plan);
             for other in (0..flights.count()).filter(|other| *other != plan.reference.vehicle) {
                 if comparisons.is_interrupted() {
                     return Err(RecordedError::Interrupted);
@@ -445,7 +452,7 @@ impl PlanAuditor {
                 let to_s = flown.to_s.min(self.judged.to_s).min(known_s).min(end_s);
                 let window = Interval { from_s: flown.from_s.max(self.judged.from_s), to_s };
                 let Some(part) = flights.part(other, window) else { continue };
-                comparisons.has_gap |= part.has_gap;
+                comparisons.has_unknown |= part.has_gap;
                 let (radius_m, tail) = (flights.radius_m(other), None);
                 let flight = Motion { segments: &part.segments, chords: &part.chords, tail, radius_m };
                 let motion = plan.motion(self.end, to_s);
@@ -458,8 +465,17 @@ impl PlanAuditor {
         Ok(comparisons.finish())
     }
 
-    /// Refuses plans whose vehicles have exchanged names. At the starts of its plans each of these vehicles is, on
-    /// average, farther away from its own plans than another one of them.
+    /// Returns whether a vehicle is farther than its limit from its plan when it begins to fly the plan. Names, frames or
+    /// clocks of plans and flights may then differ.
+    fn is_astray(&self, flights: &Flights, plan: &Known) -> bool {
+        let (vehicle, start_s, limits) = (plan.reference.vehicle, plan.flown().from_s, self.settings.limits());
+        let limit_m = limits.farthest_m(limits.of_vehicles(plan.radius_m, plan.radius_m));
+        let both = plan.position(self.end, start_s).zip(flights.position(vehicle, start_s));
+        both.is_some_and(|(planned, flown)| (planned - flown).norm() > limit_m)
+    }
+
+    /// Refuses plans whose vehicles may have exchanged names. At the starts of its plans each of these vehicles is, on
+    /// average, farther away from its own plans than another one of them, or than a vehicle without plans.
     fn refuse_exchanged(&self, flights: &Flights, plans: &[Known]) -> Result<(), RecordedError> {
         let vehicles = flights.count();
         // Sums of the distances from the own flight and from another one, by planned and by other vehicle.
@@ -481,10 +497,11 @@ impl PlanAuditor {
         };
         let nearest: Vec<_> = (0..vehicles).map(nearest).collect();
         for start in 0..vehicles {
-            let chain = std::iter::successors(nearest[start], |vehicle| nearest[*vehicle]);
-            if chain.take(vehicles).any(|vehicle| vehicle == start)
-                && let Some(other) = nearest[start]
-            {
+            let chain = std::iter::successors(nearest[start], |vehicle| nearest[*vehicle]).take(vehicles);
+            let has_plan = |vehicle: usize| plans.iter().any(|plan| plan.reference.vehicle == vehicle);
+            let is_exchanged = chain.clone().any(|vehicle| vehicle == start)
+                || chain.last().is_some_and(|vehicle| nearest[vehicle].is_none() && !has_plan(vehicle));
+            if let Some(other) = nearest[start].filter(|_| is_exchanged) {
                 let (vehicle, other) = (flights.name(start), flights.name(other));
                 return Err(RecordedError::ExchangedFlights { vehicle, other });
             }

@@ -358,6 +358,13 @@ impl Limits {
         }
     }
 
+    /// Returns a bound on the distance \[m\] of the centres of two vehicles at a distance.
+    pub(super) fn farthest_m(&self, distance: f64) -> f64 {
+        self.cylinder.map_or(distance, |Cylinder { horizontal_m, vertical_m }| {
+            horizontal_m.hypot(vertical_m) * distance * (1.0 + 4.0 * f64::EPSILON)
+        })
+    }
+
     /// Returns the limit for the centres of two vehicles with these radii.
     pub(super) fn of_vehicles(self, first: f64, second: f64) -> f64 {
         if self.by_radii { self.delta.max(first + second) } else { self.delta }
@@ -496,7 +503,14 @@ pub enum RecordedError {
         /// Problem.
         what: String,
     },
-    /// Each of some vehicles is farther from its own plans, at their starts, than another one of these vehicles.
+    /// A vehicle has plans and a clock offset: the offset moves its positions, and not the publications of its plans.
+    #[error("{OFFSET}: vehicle {vehicle} has published plans, whose publication has another clock")]
+    OffsetOfPlans {
+        /// Name of the vehicle.
+        vehicle: String,
+    },
+    /// Each of some vehicles is farther from its own plans, at their starts, than another one of these vehicles, or than a
+    /// vehicle without plans.
     #[error(
         "the plans of vehicle {vehicle} start nearer to vehicle {other} than to {vehicle}, and the names could be exchanged"
     )]

@@ -4,10 +4,10 @@ use std::slice;
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use tautline_audit::Status;
 use tautline_audit::recorded::{
-    Counterpart, Interpolation, PlanAuditor, PlanSeparations, PlansOutcome, RecordedError, Settings,
+    Counterpart, Interpolation, PlanAuditor, PlanSeparations, PlansOutcome, RecordedError, Settings, VehicleSettings,
 };
+use tautline_audit::{Cylinder, Status};
 use tautline_core::track::{Item, Piece, Plan, PlanEnd, Sample};
 
 /// Returns a plan of one piece along x, from `x_m` at 1 m/s.
@@ -268,10 +268,72 @@ fn plans_of_exchanged_vehicles_are_refused() {
     let exchanged = [flight(0, 5, second), flight(1, 5, first)];
     let error = beside_flights(&delta, &plans, &exchanged).expect_err("exchanged");
     assert_eq!(error, RecordedError::ExchangedFlights { vehicle: "0".to_owned(), other: "1".to_owned() });
-    // One vehicle far from its plan is no exchange: the other is where its plan is.
+    // One vehicle far from its plan is no exchange: the other is where its plan is. Nothing is clear, though.
     let astray = [flight(0, 5, |time_s| [time_s, 5.0, 1.0]), flight(1, 5, second)];
     let outcome = beside_flights(&delta, &plans, &astray).expect("an outcome");
     assert!(outcome.tracking_error.is_some_and(|error| (error.distance_m - 5.0).abs() < 1e-9));
+    assert!(outcome.flown.is_some_and(|flown| flown.status == Status::Undecided));
+    // Numbers that are shifted by one: the last vehicle has no plan.
+    let third = flight(2, 5, |time_s| [time_s, 9.0, 1.0]);
+    let shifted = [flight(0, 5, |time_s| [time_s, -9.0, 1.0]), flight(1, 5, first), flight(2, 5, second)];
+    let error = beside_flights(&delta, &plans, &shifted).expect_err("shifted");
+    assert!(matches!(error, RecordedError::ExchangedFlights { .. }), "{error}");
+    let [first, second] = right;
+    assert!(beside_flights(&delta, &plans, &[first, second, third]).is_ok());
+}
+
+#[test]
+fn plans_that_are_never_flown_exchange_no_names() {
+    // Each vehicle plans to fly to the other, and stays.
+    let delta = Settings::delta(0.5);
+    let flights = [flight(0, 10, |_| [0.0, 0.0, 1.0]), flight(1, 10, |_| [10.0, 0.0, 1.0])];
+    let stands = |vehicle, published_s, from_s, x_m| plan(vehicle, published_s, &[(from_s, 12.0)], &[[x_m, 0.0, 1.0]]);
+    let plans =
+        [stands(0, 5.0, 8.0, 10.0), stands(1, 5.0, 8.0, 0.0), stands(0, 6.0, 7.0, 0.0), stands(1, 6.0, 7.0, 10.0)];
+    assert_eq!(flown(&delta, &plans, &flights).status, Status::Clear);
+    // Negative twin: flown.
+    assert!(beside_flights(&delta, &plans[..2], &flights).is_err());
+}
+
+#[test]
+fn jumps_are_at_their_samples() {
+    let held = Settings { motion: Some(Interpolation::Hold), ..Settings::delta(0.5) };
+    let plans = [along_x(0, 0.0, 0.0, 5.0, 0.0, 0.0)];
+    let flights = [flight(0, 5, |time_s| [time_s, 0.0, 1.0]), flight(1, 5, |_| [0.0, 9.0, 1.0])];
+    let outcome = beside_flights(&held, &plans, &flights).expect("an outcome");
+    assert!(outcome.tracking_error.is_some_and(|error| error.distance_m < 1e-9), "{:?}", outcome.tracking_error);
+}
+
+#[test]
+fn later_plans_within_a_cylinder_are_found() {
+    // Above and beside each other by 0.9 of the cylinder: 1.27 m apart.
+    let settings = Settings { cylinder: Some(Cylinder { horizontal_m: 1.0, vertical_m: 1.0 }), ..Settings::default() };
+    let stands = |vehicle, from_s, y_m, z_m| plan(vehicle, from_s, &[(from_s, from_s + 5.0)], &[[0.0, y_m, z_m]]);
+    let flights = |end: [f64; 2]| {
+        let first = move |time_s| if time_s < 5.0 { [0.0, -0.2, 1.9] } else { [0.0, end[0], end[1]] };
+        [flight(0, 10, first), flight(1, 10, |_| [0.0, 0.9, 1.9])]
+    };
+    let plans = [stands(0, 0.0, -0.2, 1.9), stands(0, 5.0, 0.0, 1.0)];
+    assert_eq!(flown(&settings, &plans, &flights([0.0, 1.0])).status, Status::Violation);
+    let mut between = plans.to_vec();
+    between.insert(0, plan(1, 0.0, &[(0.0, 10.0)], &[[0.0, 0.9, 1.9]]));
+    let names = ["0".to_owned(), "1".to_owned()];
+    let mut auditor = PlanAuditor::new(settings.clone(), PlanEnd::Hold).expect("settings");
+    for plan in &between {
+        auditor.push(&names, plan).expect("a plan");
+    }
+    assert_eq!(auditor.finish().expect("an outcome").published.status, Status::Violation);
+    // Negative twin: 1.05 of the cylinder.
+    let clear = [plans[0].clone(), stands(0, 5.0, -0.15, 1.0)];
+    assert_eq!(flown(&settings, &clear, &flights([-0.15, 1.0])).status, Status::Clear);
+}
+
+#[test]
+fn clock_offsets_of_vehicles_with_plans_are_refused() {
+    let offset = VehicleSettings { offset_s: -5.0, ..VehicleSettings::default() };
+    let settings = Settings { vehicles: [("0".to_owned(), offset)].into(), ..Settings::delta(0.5) };
+    let error = PlanAuditor::new(settings, PlanEnd::Hold).expect_err("an offset");
+    assert_eq!(error, RecordedError::OffsetOfPlans { vehicle: "0".to_owned() });
 }
 
 /// Returns the position of a plan at an instant, held after its end.
@@ -372,15 +434,16 @@ proptest! {
             Err(RecordedError::ExchangedFlights { .. }) => return Ok(()),
             outcome => outcome.expect("an outcome").flown.expect("flights"),
         };
-        let (mut least, mut is_compared) = (f64::INFINITY, false);
+        let (mut least, mut is_compared, mut is_astray) = (f64::INFINITY, false, false);
         for (k, plan) in plans.iter().enumerate() {
             let next = plans[k + 1..].iter().filter(|next| next.vehicle == plan.vehicle);
             let until_s = next.map(|next| next.pieces[0].from_s.max(next.published_s)).fold(4.0, f64::min);
             let from_s = plan.pieces[0].from_s.max(plan.published_s);
-            if from_s > until_s {
+            if from_s >= until_s {
                 continue;
             }
             is_compared = true;
+            is_astray |= (position(plan, from_s) - place(plan.vehicle, from_s)).norm() > 0.5;
             let number = plans[..=k].iter().filter(|earlier| earlier.vehicle == plan.vehicle).count() as u64;
             for other in (0..3).filter(|other| *other != plan.vehicle) {
                 for step in 0..=400 {
@@ -397,7 +460,12 @@ proptest! {
                 }
             }
         }
-        prop_assert_eq!(outcome.status == Status::Undecided, !is_compared);
+        let is_decided = is_compared && !is_astray;
+        prop_assert_eq!(outcome.status, match outcome.violations[..] {
+            [] if is_decided => Status::Clear,
+            [] => Status::Undecided,
+            _ => Status::Violation,
+        });
         if let Some(closest) = outcome.closest.first() {
             prop_assert!(closest.approach.lower_m <= least + 1e-9, "{closest:?} {least}");
         }

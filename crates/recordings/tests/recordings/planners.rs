@@ -215,12 +215,20 @@ fn curves_beside_positions_are_plans_of_the_vehicles_with_their_numbers() {
     // A vehicle without plans is no fault. A number in no name, in two names, and in all names are.
     let other = [odometry("/uav2_7/odom", 0), odometry("/uav2_7/odom", 200_000_000)];
     whole("plan.mcap", &mcap_of(&[&curves[..], &flights.concat(), &other].concat()));
-    let unknown = [&[of(&spline(3, 0, 9.0))], &flights.concat()[..]].concat();
-    assert_refused(&refused(&unknown, &ReadOptions::default()), "recording/ambiguous-topics", "");
-    let twice = [&curves[1..], &flights.concat()[..], &[odometry("/uav1_9/odom", 0)]].concat();
-    assert_refused(&refused(&twice, &ReadOptions::default()), "recording/ambiguous-topics", "");
-    let common = [&[of(&spline(2, 0, 9.0))], &flights.concat()[..]].concat();
-    assert_refused(&refused(&common, &ReadOptions::default()), "recording/ambiguous-topics", "");
+    let ambiguous = |drones: &[i32], topics: &[&'static str]| {
+        let curves = drones.iter().map(|drone| of(&spline(*drone, 0, f64::from(*drone))));
+        let flights = topics.iter().flat_map(|topic| [odometry(topic, 0), odometry(topic, 200_000_000)]);
+        let messages: Vec<_> = curves.chain(flights).collect();
+        let read = read_bytes("plan.mcap", &mcap_of(&messages), &ReadOptions::default());
+        read.inspect_err(|error| assert_refused(error, "recording/ambiguous-topics", "")).is_err()
+    };
+    assert!(ambiguous(&[3], &["/uav2_1/odom", "/uav2_12/odom"]));
+    assert!(ambiguous(&[2], &["/uav2_1/odom", "/uav2_12/odom"]), "a number in all names");
+    assert!(ambiguous(&[2, 3], &["/drone_3/vins2/odom", "/drone_5/odom"]), "two drones, one vehicle");
+    assert!(ambiguous(&[2], &["/drone_3/odom2", "/drone_5/odom"]), "a number in one name only");
+    assert!(ambiguous(&[1], &["/from1to2/odom", "/from2to1/odom"]), "two positions");
+    assert!(!ambiguous(&[1, 2, 3], &["/agent1/lidar3/odom", "/agent2/lidar3/odom", "/agent3/lidar3/odom"]));
+    assert!(!ambiguous(&[1], &["/drone_1/odom", "/human/odom"]), "a name without a number");
 }
 
 #[test]

@@ -109,7 +109,10 @@ impl Answer {
             }
             Status::Undecided => match self.undecided.listed.first() {
                 Some(finding) => finding.sentence(self.part, false),
-                None if is_flown => "flights have gaps, or no plan is valid during another vehicle's flight".to_owned(),
+                None if is_flown => {
+                    "flights have gaps or do not begin at their plans, or no plan is flown beside another flight"
+                        .to_owned()
+                }
                 None => "no two published plans are known at the same time".to_owned(),
             },
         }

@@ -160,8 +160,7 @@ impl PlannerCurves {
             let problem = "its positions are places on the Earth, curves of planners are not";
             return refuse(ContentKind::AmbiguousTopics, problem, one_kind());
         }
-        let indices = self.drones.keys().map(|drone| Ok((*drone, vehicle_of(*drone, positions.vehicles())?)));
-        let indices = indices.collect::<Result<_, Fault>>()?;
+        let indices = vehicles_of(self.drones.keys(), positions.vehicles())?;
         let plans = self.published_plans(&indices, positions.clock().epoch_ns, options.metres())?;
         let mut notes = vec![format!("{}, beside positions", self.counts())];
         notes.extend(self.notes());
@@ -313,28 +312,36 @@ fn one_kind() -> String {
     format!("choose the topics of curves or those of positions with {TOPIC}")
 }
 
-/// Returns the vehicle whose name has the number of a drone. A number in the names of all vehicles does not count.
-fn vehicle_of(drone: i32, names: &[String]) -> Result<usize, Fault> {
-    let numbers = |name: &String| -> BTreeSet<u64> {
-        name.split(|c: char| !c.is_ascii_digit()).filter_map(|digits| digits.parse().ok()).collect()
+/// Returns the vehicles of drones by the numbers in their names.
+///
+/// Names are compared number by number. Of the names with a number, all must have a number at the same position, such as
+/// the first, and these must differ. Each drone must have one of them. All such positions must give the same vehicles.
+fn vehicles_of<'a>(
+    drones: impl Iterator<Item = &'a i32> + Clone,
+    names: &[String],
+) -> Result<BTreeMap<i32, usize>, Fault> {
+    let numbers = |(index, name): (usize, &String)| {
+        let numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());
+        let numbers: Vec<Option<i32>> = numbers.map(|digits| digits.parse().ok()).collect();
+        (!numbers.is_empty()).then_some((index, numbers))
     };
-    let all: Vec<_> = names.iter().map(numbers).collect();
-    let is_common = |number: &u64| all.len() > 1 && all.iter().all(|numbers| numbers.contains(number));
-    let has = |numbers: &BTreeSet<u64>| {
-        numbers.iter().any(|number| i64::try_from(*number) == Ok(drone.into()) && !is_common(number))
+    let numbered: Vec<_> = names.iter().enumerate().filter_map(numbers).collect();
+    let length = numbered.iter().map(|(_, numbers)| numbers.len()).min().unwrap_or(0);
+    let at = |position: usize| -> Option<BTreeMap<i32, usize>> {
+        let vehicles = numbered.iter().map(|(index, numbers)| Some((numbers[position]?, *index)));
+        let vehicles: BTreeMap<_, _> = vehicles.collect::<Option<_>>()?;
+        let all = (vehicles.len() == numbered.len()).then_some(vehicles)?;
+        drones.clone().map(|drone| Some((*drone, *all.get(drone)?))).collect()
     };
-    let mut found = all.iter().enumerate().filter(|(_, numbers)| has(numbers)).map(|(index, _)| index);
-    let problem = match (found.next(), found.next()) {
-        (Some(vehicle), None) => return Ok(vehicle),
-        (Some(first), Some(second)) => {
-            let (first, second) = (quoted(&names[first]), quoted(&names[second]));
-            format!("curves are of drone {drone}, a number in the names of both {first} and {second}")
-        }
-        _ => {
-            format!("curves are of drone {drone}, but no vehicle with positions has this number: {}", names.join(", "))
-        }
+    let mut found: Vec<_> = (0..length).filter_map(at).collect();
+    found.dedup();
+    let listed = || drones.clone().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let problem = match &mut found[..] {
+        [one] => return Ok(std::mem::take(one)),
+        [] => format!("curves are of drones {}, which are not the numbers of vehicles with positions", listed()),
+        _ => format!("curves are of drones {}, which are several numbers of vehicles with positions", listed()),
     };
-    refuse(ContentKind::AmbiguousTopics, problem, one_kind())
+    refuse(ContentKind::AmbiguousTopics, format!("{problem}: {}", names.join(", ")), one_kind())
 }
 
 /// Positions of vehicles, and their published plans.

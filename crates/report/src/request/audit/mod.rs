@@ -185,6 +185,7 @@ impl ConfiguredAudit<'_> {
         let is_planar = recording.is_planar();
         let level = places::refuse_unknown(request, self.asked_by(), &settings, recording.as_ref())?;
         request.refuse_guessed_seconds(&settings, recording.clock(), &items)?;
+        let plan_auditor = request.plan_auditor(recording.as_ref(), &settings, monitor)?;
         monitor.begin(&called, None);
         let (mut curves, mut span) = (true, ItemSpan::default());
         loop {
@@ -210,7 +211,10 @@ impl ConfiguredAudit<'_> {
         if clock.inferred && facts.iter().all(|fact| fact.kind != FactKind::TimeUnit) {
             facts.push(Fact::name(FactKind::TimeUnit, FactSource::Inferred, &clock.unit));
         }
-        let plans = request.judge_plans(recording.as_ref(), &settings, &outcome, !curves, monitor)?;
+        let flights = (!curves).then_some(&settings);
+        let plan_auditor = plan_auditor.filter(|_| outcome.separation.is_some());
+        let judge = |auditor| request.judge_plans(recording.as_ref(), auditor, flights, monitor);
+        let plans = plan_auditor.map(judge).transpose()?;
         let notes = recording.notes().to_vec();
         request.check_count(&outcome, &settings)?;
         side_files.check(&settings, &outcome)?;
