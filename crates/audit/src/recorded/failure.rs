@@ -54,24 +54,22 @@ impl From<RecordedError> for Failure {
                 ("audit/land-on", message, help)
             }
             RecordedError::AmbiguousObstacle { .. } => {
-                let help = format!("give each obstacle its own name, or leave {LAND_ON} out");
-                ("audit/land-on", message, help)
+                ("audit/land-on", message, format!("give each obstacle its own name, or leave {LAND_ON} out"))
             }
             RecordedError::UnknownObstacle { .. } => {
-                let help = format!("use the names of the obstacles, or leave {LAND_ON} out");
-                ("audit/land-on", message, help)
+                ("audit/land-on", message, format!("use the names of the obstacles, or leave {LAND_ON} out"))
             }
             RecordedError::NotACurve { .. } => {
                 ("audit/no-curves", message, format!("give {}, hold or bounded", MOTION.set("linear")))
             }
             RecordedError::NotSamples { .. } => {
-                let help = format!("leave {MOTION} out, or give {}", MOTION.set("polynomial"));
-                ("audit/no-samples", message, help)
+                ("audit/no-samples", message, format!("leave {MOTION} out, or give {}", MOTION.set("polynomial")))
             }
-            RecordedError::RadiusChanges { .. } => {
-                let help = format!("give one radius of the vehicle with {}", RADIUS.set("NAME=R"));
-                ("audit/radius-changes", message, help)
-            }
+            RecordedError::RadiusChanges { .. } => (
+                "audit/radius-changes",
+                message,
+                format!("give one radius of the vehicle with {}", RADIUS.set("NAME=R")),
+            ),
             RecordedError::ExchangedFlights { .. } => {
                 ("audit/exchanged-flights", message, format!("judge plans or positions alone with {TOPIC}"))
             }

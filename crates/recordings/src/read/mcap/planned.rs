@@ -160,7 +160,8 @@ impl PlannerCurves {
             let problem = "its positions are places on the Earth, curves of planners are not";
             return refuse(ContentKind::AmbiguousTopics, problem, one_kind());
         }
-        let indices = vehicles_of(self.drones.keys(), positions.vehicles())?;
+        let drones: Vec<_> = self.drones.keys().copied().collect();
+        let indices = vehicles_of(&drones, positions.vehicles())?;
         let plans = self.published_plans(&indices, positions.clock().epoch_ns, options.metres())?;
         let mut notes = vec![format!("{}, beside positions", self.counts())];
         notes.extend(self.notes());
@@ -316,10 +317,7 @@ fn one_kind() -> String {
 ///
 /// Names are compared number by number. Of the names with a number, all must have a number at the same position, such as
 /// the first, and these must differ. Each drone must have one of them. All such positions must give the same vehicles.
-fn vehicles_of<'a>(
-    drones: impl Iterator<Item = &'a i32> + Clone,
-    names: &[String],
-) -> Result<BTreeMap<i32, usize>, Fault> {
+fn vehicles_of(drones: &[i32], names: &[String]) -> Result<BTreeMap<i32, usize>, Fault> {
     let numbers = |(index, name): (usize, &String)| {
         let numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());
         let numbers: Vec<Option<i32>> = numbers.map(|digits| digits.parse().ok()).collect();
@@ -331,11 +329,11 @@ fn vehicles_of<'a>(
         let vehicles = numbered.iter().map(|(index, numbers)| Some((numbers[position]?, *index)));
         let vehicles: BTreeMap<_, _> = vehicles.collect::<Option<_>>()?;
         let all = (vehicles.len() == numbered.len()).then_some(vehicles)?;
-        drones.clone().map(|drone| Some((*drone, *all.get(drone)?))).collect()
+        drones.iter().map(|drone| Some((*drone, *all.get(drone)?))).collect()
     };
     let mut found: Vec<_> = (0..length).filter_map(at).collect();
     found.dedup();
-    let listed = || drones.clone().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let listed = || drones.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let problem = match &mut found[..] {
         [one] => return Ok(std::mem::take(one)),
         [] => format!("curves are of drones {}, which are not the numbers of vehicles with positions", listed()),
