@@ -11,7 +11,7 @@ use super::dryden::Dryden;
 /// Number of standard deviations of turbulence used as its largest value in estimates.
 const SIGMAS: f64 = 4.0;
 
-/// Wind. It acts on points that have a drag (`vehicle.drag_per_s`).
+/// Wind. It acts on quadrotors, and on points that have a drag (`vehicle.drag_per_s`).
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct WindSpec {

@@ -48,7 +48,7 @@ pub struct NetworkSpec {
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = StalePolicy::default()))]
     pub missing: StalePolicy,
-    /// How a vehicle knows near vehicles, with or without a link.
+    /// Source of the states of near vehicles, with or without a link.
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = NearStates::default()))]
     pub near: NearStates,
@@ -68,7 +68,7 @@ pub enum StalePolicy {
     Extrapolate,
 }
 
-/// How a vehicle knows near vehicles.
+/// Source of the states of near vehicles.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum NearStates {

@@ -29,7 +29,7 @@ pub(super) struct ReferenceTable {
     /// Vehicle that follows only the reference; the other vehicles follow the leader.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) leader: Option<u64>,
-    /// Whether all vehicles know the acceleration of the reference.
+    /// Whether all vehicles receive the acceleration of the reference.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
     #[schemars(extend("default" = true))]
     pub(super) feed_forward: bool,

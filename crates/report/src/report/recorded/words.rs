@@ -90,10 +90,16 @@ impl RecordedReport {
         }
     }
 
-    /// Returns the motion between samples, with the assumptions on the samples and on obstacles.
+    /// Returns the motion between samples, with the assumptions on the samples and on obstacles. The facts on plans are
+    /// among them only if the vehicles fly the plans.
     #[must_use]
     pub fn motion(&self) -> String {
-        let of_motion = |fact: &&Fact| !is_of_part(fact) && (fact.kind == FactKind::Motion || fact.is_assumption());
+        let are_flights = self.source.facts.iter().any(|fact| fact.kind == FactKind::FlownPlans);
+        let of_motion = |fact: &&Fact| {
+            !is_of_part(fact)
+                && !(are_flights && is_of_published_plan(fact))
+                && (fact.kind == FactKind::Motion || fact.is_assumption())
+        };
         self.clauses(of_motion).join(", ")
     }
 
