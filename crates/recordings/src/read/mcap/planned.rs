@@ -333,13 +333,15 @@ fn vehicles_of(drones: &[i32], names: &[String]) -> Result<BTreeMap<i32, usize>,
     };
     let mut found: Vec<_> = (0..length).filter_map(at).collect();
     found.dedup();
-    let listed = || drones.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let problem = match &mut found[..] {
+    let how = match &mut found[..] {
         [one] => return Ok(std::mem::take(one)),
-        [] => format!("curves are of drones {}, which are not the numbers of vehicles with positions", listed()),
-        _ => format!("curves are of drones {}, which are several numbers of vehicles with positions", listed()),
+        [] => "do not fit",
+        _ => "fit in several ways",
     };
-    refuse(ContentKind::AmbiguousTopics, format!("{problem}: {}", names.join(", ")), one_kind())
+    let drones = drones.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let names = names.join(", ");
+    let problem = format!("the numbers of the drones with curves ({drones}) {how} the names of positions: {names}");
+    refuse(ContentKind::AmbiguousTopics, problem, one_kind())
 }
 
 /// Positions of vehicles, and their published plans.
