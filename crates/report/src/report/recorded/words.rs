@@ -96,9 +96,8 @@ impl RecordedReport {
     pub fn motion(&self) -> String {
         let are_flights = self.source.facts.iter().any(|fact| fact.kind == FactKind::FlownPlans);
         let of_motion = |fact: &&Fact| {
-            !is_of_part(fact)
-                && !(are_flights && is_of_published_plan(fact))
-                && (fact.kind == FactKind::Motion || fact.is_assumption())
+            let is_other = is_of_part(fact) || are_flights && is_of_published_plan(fact);
+            !is_other && (fact.kind == FactKind::Motion || fact.is_assumption())
         };
         self.clauses(of_motion).join(", ")
     }
