@@ -128,7 +128,7 @@ coded! {
         PlanEnd = "plan-end",
         /// Instants at which plans are published.
         PlanPublication = "plan-publication",
-        /// Which plan is that of which recorded flight.
+        /// Assignment of plans to recorded flights.
         FlownPlans = "flown-plans",
         /// Accelerations are means over windows.
         MeanAcceleration = "mean-acceleration",

@@ -7,9 +7,9 @@
 //! A plan that ends is held, flown on, or unknown ([`PlanEnd`]). Held and continued plans are compared until both have
 //! ended.
 //!
-//! If the positions of the vehicles are recorded too, each plan is also compared with the flights of all other vehicles.
-//! Only the time counts until the next plan of its vehicle starts. The largest distance of each flight from its own plan
-//! is found at the recorded positions.
+//! If the positions of the vehicles are recorded too, each plan is also compared with the flights of all other
+//! vehicles. Only the time counts until the next plan of its vehicle starts. The largest distance of each flight from
+//! its own plan is found at the recorded positions.
 //!
 //! The distances are those of [`audit`](super::audit): enclosed on curves by Bernstein coefficients, and checked by
 //! parry. A bound on the motion of two plans leaves out those that are neither below their limit nor among the
@@ -85,8 +85,8 @@ pub struct PlanConflict {
     pub from_s: f64,
     /// End \[s\].
     pub to_s: f64,
-    /// Bounds of the smallest distance \[m\]; equal for a violation. With a bounded motion of flights, a violation has no
-    /// lower bound.
+    /// Bounds of the smallest distance \[m\]; equal for a violation. With a bounded motion of flights, a violation has
+    /// no lower bound.
     pub lower_m: f64,
     /// See `lower_m`.
     pub upper_m: f64,
@@ -129,11 +129,11 @@ pub struct PlanApproach {
 /// Separations of plans from other plans, or from flights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSeparations {
-    /// Verdict. It is undecided if nothing was compared, if the motion of a flight is unknown during a comparison, or if a
-    /// vehicle is farther than its limit from its plan when it begins to fly the plan.
+    /// Verdict. It is undecided if nothing was compared, or if the motion of a flight is unknown during a comparison. So
+    /// it is if a vehicle is farther than its limit from its plan when it begins to fly the plan.
     pub status: Status,
-    /// Number of comparisons of a plan with a plan, or with a flight. A comparison of two vehicles that are on the ground
-    /// throughout does not count.
+    /// Number of comparisons of a plan with a plan, or with a flight. A comparison of two vehicles that are on the
+    /// ground throughout does not count.
     pub comparisons: u64,
     /// Times below the limit, by start; of a long list the worst, and the first of each two motions.
     pub violations: Vec<PlanConflict>,
@@ -171,7 +171,8 @@ pub struct PlansOutcome {
     pub published: PlanSeparations,
     /// Separations of each plan from the flights of other vehicles; `None` without flights.
     pub flown: Option<PlanSeparations>,
-    /// Largest distance of a flight from its plan at the recorded positions; `None` without flights of planned vehicles.
+    /// Largest distance of a flight from its plan at the recorded positions; `None` without flights of planned
+    /// vehicles.
     pub tracking_error: Option<TrackingError>,
 }
 
@@ -465,8 +466,8 @@ impl PlanAuditor {
         Ok(comparisons.finish())
     }
 
-    /// Returns whether a vehicle is farther than its limit from its plan when it begins to fly the plan. Names, frames or
-    /// clocks of plans and flights may then differ.
+    /// Returns whether a vehicle is farther than its limit from its plan when it begins to fly the plan. Names, frames
+    /// or clocks of plans and flights may then differ.
     fn is_astray(&self, flights: &Flights, plan: &Known) -> bool {
         let (vehicle, start_s, limits) = (plan.reference.vehicle, plan.flown().from_s, self.settings.limits());
         let limit_m = limits.farthest_m(limits.of_vehicles(plan.radius_m, plan.radius_m));

@@ -509,11 +509,9 @@ pub enum RecordedError {
         /// Name of the vehicle.
         vehicle: String,
     },
-    /// Each of some vehicles is farther from its own plans, at their starts, than another one of these vehicles, or than a
-    /// vehicle without plans.
-    #[error(
-        "the plans of vehicle {vehicle} start nearer to vehicle {other} than to {vehicle}, and the names could be exchanged"
-    )]
+    /// Each of some vehicles is farther from its own plans, at their starts, than another one of these vehicles, or than
+    /// a vehicle without plans.
+    #[error("the plans of vehicle {vehicle} start nearer to vehicle {other}, and the names could be exchanged")]
     ExchangedFlights {
         /// Name of the vehicle.
         vehicle: String,

@@ -429,7 +429,8 @@ proptest! {
             let [from, to] = [before, before + 1].map(|k| Vector3::from(corners[vehicle][k]));
             from + (to - from) * (time_s - before as f64)
         };
-        let flights: Vec<_> = (0..3).map(|vehicle| flight(vehicle, 4, |time_s| place(vehicle, time_s).into())).collect();
+        let flown = |vehicle| flight(vehicle, 4, |time_s| place(vehicle, time_s).into());
+        let flights: Vec<_> = (0..3).map(flown).collect();
         let outcome = match beside_flights(&Settings::delta(0.5), &plans, &flights) {
             Err(RecordedError::ExchangedFlights { .. }) => return Ok(()),
             outcome => outcome.expect("an outcome").flown.expect("flights"),

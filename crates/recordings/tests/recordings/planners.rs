@@ -209,8 +209,8 @@ fn curves_beside_positions_are_plans_of_the_vehicles_with_their_numbers() {
     let (published, assumed) = plans(&bytes);
     let name = |vehicle: &str| format!("/uav2_{vehicle}/odom");
     assert_eq!(published, [(0.0, name("1"), 0.0, 4.0), (0.25, name("12"), 0.25, 4.25)]);
-    let numbers = "plans have the frame and the clock of the positions, and belong to the vehicles with their numbers in \
-                   the names";
+    let numbers = "plans have the frame and the clock of the positions, \
+                   and belong to the vehicles with their numbers in the names";
     assert!(assumed.contains(&numbers.to_owned()), "{assumed:?}");
     // A vehicle without plans is no fault. A number in no name, in two names, and in all names are.
     let other = [odometry("/uav2_7/odom", 0), odometry("/uav2_7/odom", 200_000_000)];

@@ -44,8 +44,8 @@ pub(super) fn is_curve(topic: &DeclaredTopic) -> bool {
     curve_kind(&topic.schema, &topic.definition).is_some()
 }
 
-/// Fields of the types in messages of planners, and the full name of the ROS type. A definition may leave the section of
-/// such a type out.
+/// Fields of the types in messages of planners, and the full name of the ROS type. A definition may leave the section
+/// of such a type out.
 const STANDARD: [(&str, &str, &str); 2] = [
     ("Time", "builtin_interfaces/Time", "int32 sec\nuint32 nanosec"),
     ("Point", "geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z"),
@@ -67,8 +67,8 @@ pub(super) fn curve_kind(schema: &str, definition: &str) -> Option<CurveKind> {
     found.or(named.map(|_| CurveKind::Unsupported))
 }
 
-/// Returns the fields of a definition, one a line: type and name. Constants and comments are left out. The types `Time`,
-/// `Point` and `Bspline` stand for all types with their fields.
+/// Returns the fields of a definition, one a line: type and name. Constants and comments are left out. The types
+/// `Time`, `Point` and `Bspline` stand for all types with their fields.
 pub(super) fn fields(schema: &str, definition: &str) -> String {
     Definition::new(schema, definition).fields()
 }

@@ -3,8 +3,9 @@
 //! JSON of a live source, which has no definitions, the fields decide.
 //!
 //! A curve of a drone is flown from its start until the next one of that drone starts. The whole curve is a published
-//! plan ([`Published`]). Beside topics of positions, these are the flight, and curves are plans alone. The trajectory server of the first version holds the last point of a curve. That of the second
-//! version sends nothing after the end: that the drone holds the last point is a default there.
+//! plan ([`Published`]). Beside topics of positions, these are the flight, and curves are plans alone. The trajectory
+//! server of the first version holds the last point of a curve. That of the second version sends nothing after the end:
+//! that the drone holds the last point is a default there.
 //!
 //! A B-spline has its degree in `order`, and its time 0 at the knot with this index. A MINCO trajectory of order 5 is
 //! the curve of least jerk through its points. A polynomial trajectory of order 5 has six coefficients of each piece,
@@ -315,8 +316,8 @@ fn one_kind() -> String {
 
 /// Returns the vehicles of drones by the numbers in their names.
 ///
-/// Names are compared number by number. Of the names with a number, all must have a number at the same position, such as
-/// the first, and these must differ. Each drone must have one of them. All such positions must give the same vehicles.
+/// Names are compared number by number. Of the names with a number, all must have a number at the same position, such
+/// as the first, and these must differ. Each drone must have one of them. All such positions must give the same vehicles.
 fn vehicles_of(drones: &[i32], names: &[String]) -> Result<BTreeMap<i32, usize>, Fault> {
     let numbers = |(index, name): (usize, &String)| {
         let numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());
