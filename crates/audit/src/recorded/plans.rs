@@ -129,8 +129,8 @@ pub struct PlanApproach {
 /// Separations of plans from other plans, or from flights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSeparations {
-    /// Verdict. It is undecided if nothing was compared, or if the motion of a flight is unknown during a comparison. So
-    /// it is if a vehicle is farther than its limit from its plan when it begins to fly the plan.
+    /// Verdict. It is undecided if nothing was compared, or if the motion of a flight is unknown during a comparison.
+    /// So it is if a vehicle is farther than its limit from its plan when it begins to fly the plan.
     pub status: Status,
     /// Number of comparisons of a plan with a plan, or with a flight. A comparison of two vehicles that are on the
     /// ground throughout does not count.

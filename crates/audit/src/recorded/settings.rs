@@ -509,8 +509,8 @@ pub enum RecordedError {
         /// Name of the vehicle.
         vehicle: String,
     },
-    /// Each of some vehicles is farther from its own plans, at their starts, than another one of these vehicles, or than
-    /// a vehicle without plans.
+    /// Each of some vehicles is farther from its own plans, at their starts, than another one of these vehicles, or
+    /// than a vehicle without plans.
     #[error("the plans of vehicle {vehicle} start nearer to vehicle {other}, and the names could be exchanged")]
     ExchangedFlights {
         /// Name of the vehicle.

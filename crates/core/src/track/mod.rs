@@ -230,8 +230,8 @@ pub trait Tracks {
 
     /// Returns the plans of a recording of planners, in order of publication. The items of such a recording are the
     /// recorded positions. If the recording has none, the items are the parts of the plans that the vehicles fly: each
-    /// until the next one of its vehicle starts. All other recordings have no plans. The method has no default, so that a
-    /// recording around another one cannot lose its plans.
+    /// until the next one of its vehicle starts. All other recordings have no plans. The method has no default, so that
+    /// a recording around another one cannot lose its plans.
     fn plans(&self) -> &[Plan];
 
     /// [`Metadata::clock`].

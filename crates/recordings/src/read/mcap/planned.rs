@@ -317,7 +317,8 @@ fn one_kind() -> String {
 /// Returns the vehicles of drones by the numbers in their names.
 ///
 /// Names are compared number by number. Of the names with a number, all must have a number at the same position, such
-/// as the first, and these must differ. Each drone must have one of them. All such positions must give the same vehicles.
+/// as the first, and these must differ. Each drone must have one of them. All such positions must
+/// give the same vehicles.
 fn vehicles_of(drones: &[i32], names: &[String]) -> Result<BTreeMap<i32, usize>, Fault> {
     let numbers = |(index, name): (usize, &String)| {
         let numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());
