@@ -224,7 +224,7 @@ fn finding(of: &Violation<Pair>, monitor: &Monitor) -> Value {
     })
 }
 
-/// Returns a plan of a planner.
+/// Returns a plan of a planner, or a flight, whose number is null.
 fn planned(motion: Counterpart, monitor: &Monitor) -> Value {
     let plan = motion.plan();
     let (number, published_s) = (plan.map(|plan| plan.number), plan.map(|plan| plan.published_s));

@@ -166,9 +166,10 @@ fn plan_conflict(conflict: &PlanConflict, left_s: f64, monitor: &Monitor) -> Str
     let facts = monitor.plan_facts();
     let end = facts.iter().find(|fact| fact.kind == FactKind::PlanEnd);
     let end = end.map_or_else(String::new, |end| format!("; {end} ({})", end.source.code()));
-    let may = if conflict.min_at_s.is_none() { "may " } else { "" };
+    let [may, possibly] = if conflict.min_at_s.is_none() { ["may ", "possibly "] } else { [""; 2] };
     format!(
-        "{plan} and {other} {may}come to {min_m} m{min_at} (delta {} m): closer than delta from {} to {}, in {} s{end}",
+        "{plan} and {other} {may}come to {min_m} m{min_at} (delta {} m): {possibly}closer than delta from {} to {}, in \
+         {} s{end}",
         conflict.limit_m,
         seconds(conflict.from_s),
         seconds(conflict.to_s),

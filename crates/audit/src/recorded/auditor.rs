@@ -153,15 +153,7 @@ impl TrackAuditor {
     /// # Errors
     /// [`RecordedError`] if an item is invalid, or the work is interrupted. The auditor cannot be used after an error.
     pub fn push(&mut self, names: &[String], items: &[Item]) -> Result<(), RecordedError> {
-        if self.rates.is_none() && !items.is_empty() {
-            let given = self.settings.max_gap_s.is_some();
-            self.rates = Some(if given { Rates::default() } else { Rates::learn(items, names.len()) });
-        }
-        for name in names.iter().skip(self.vehicles.len()) {
-            let usual = || self.rates.as_ref().map_or(f64::INFINITY, |rates| rates.max_gap_s(self.vehicles.len()));
-            let max_gap_s = self.settings.max_gap_s.unwrap_or_else(usual);
-            self.vehicles.push(Vehicle::new(name, &self.settings, max_gap_s));
-        }
+        Rates::add_vehicles(&mut self.rates, &mut self.vehicles, &self.settings, names, items);
         for item in items {
             if self.refused.is_some() {
                 break;

@@ -40,15 +40,7 @@ impl Flights {
 
     /// Adds the next items of vehicles with these names.
     pub(super) fn push(&mut self, names: &[String], items: &[Item]) -> Result<(), RecordedError> {
-        if self.rates.is_none() && !items.is_empty() {
-            let is_given = self.settings.max_gap_s.is_some();
-            self.rates = Some(if is_given { Rates::default() } else { Rates::learn(items, names.len()) });
-        }
-        for name in names.iter().skip(self.vehicles.len()) {
-            let usual_s = || self.rates.as_ref().map_or(f64::INFINITY, |rates| rates.max_gap_s(self.vehicles.len()));
-            let max_gap_s = self.settings.max_gap_s.unwrap_or_else(usual_s);
-            self.vehicles.push(Vehicle::new(name, &self.settings, max_gap_s));
-        }
+        Rates::add_vehicles(&mut self.rates, &mut self.vehicles, &self.settings, names, items);
         for item in items {
             let index = item.vehicle();
             let vehicle = self.vehicles.get_mut(index).ok_or(RecordedError::Unnamed { vehicle: index })?;
@@ -98,12 +90,11 @@ impl Flights {
         if window.from_s > window.to_s || within.is_empty() && (before.is_empty() || after.is_empty()) {
             return None;
         }
-        let is_known = |first: f64, next: f64| next <= first;
-        let begins = within.first().map_or(f64::INFINITY, |first| first.from_s);
-        let ends = within.last().map_or(f64::NEG_INFINITY, |last| last.to_s);
-        let has_gap = !before.is_empty() && !is_known(window.from_s, begins)
-            || !after.is_empty() && !is_known(ends, window.to_s)
-            || within.windows(2).any(|pair| !is_known(pair[0].to_s, pair[1].from_s));
+        let from_s = within.first().map_or(f64::INFINITY, |first| first.from_s);
+        let to_s = within.last().map_or(f64::NEG_INFINITY, |last| last.to_s);
+        let has_gap = !before.is_empty() && from_s > window.from_s
+            || !after.is_empty() && to_s < window.to_s
+            || within.windows(2).any(|pair| pair[1].from_s > pair[0].to_s);
         let segments: Vec<_> = within.iter().filter_map(|segment| segment.clipped(window)).collect();
         let chords = segments.iter().map(Chord::new).collect();
         Some(FlightPart { segments, chords, has_gap })

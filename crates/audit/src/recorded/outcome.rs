@@ -395,6 +395,24 @@ impl Rates {
         Self { own_s, common_s: median(&mut all_s), curves }
     }
 
+    /// Adds the vehicles with these names that are not known yet. `learnt` are the usual intervals in the first items,
+    /// which are needed if the settings give no longest gap.
+    pub(super) fn add_vehicles(
+        learnt: &mut Option<Self>,
+        vehicles: &mut Vec<Vehicle>,
+        settings: &Settings,
+        names: &[String],
+        items: &[Item],
+    ) {
+        if learnt.is_none() && !items.is_empty() && settings.max_gap_s.is_none() {
+            *learnt = Some(Self::learn(items, names.len()));
+        }
+        for (index, name) in names.iter().enumerate().skip(vehicles.len()) {
+            let usual_s = || learnt.as_ref().map_or(f64::INFINITY, |rates| rates.max_gap_s(index));
+            vehicles.push(Vehicle::new(name, settings, settings.max_gap_s.unwrap_or_else(usual_s)));
+        }
+    }
+
     /// Returns the longest interval of a vehicle without a gap \[s\].
     pub(super) fn max_gap_s(&self, vehicle: usize) -> f64 {
         if self.curves.get(vehicle).copied().unwrap_or(false) {

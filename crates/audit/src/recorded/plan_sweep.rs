@@ -183,7 +183,7 @@ impl Comparisons {
 
     /// Counts the comparison of two motions in a window. Returns `false` without a time at which one of them is above
     /// the ground.
-    pub(super) fn judges(&mut self, motion: &Motion<'_>, other: &Motion<'_>, window: Interval) -> bool {
+    pub(super) fn count_judged(&mut self, motion: &Motion<'_>, other: &Motion<'_>, window: Interval) -> bool {
         let mut is_judged = self.limits.above.is_none();
         if !is_judged {
             overlaps(&motion.segments_in(window), &other.segments_in(window), |overlap| {

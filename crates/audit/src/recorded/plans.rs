@@ -1,20 +1,21 @@
 //! Audit of published plans: each plan against all plans that were valid at its publication.
 //!
-//! At its publication a plan P replaces earlier plans of its vehicle from its start on. It is compared with the latest
-//! plans of all other vehicles that were published before, over the whole time in which both are known. Its vehicle
-//! could know these plans. Every pair of plans is thus compared once, when the later of the two is published.
+//! At its publication a plan P replaces earlier plans of its vehicle from its start on. P is compared with the valid
+//! plans of all other vehicles, over the whole time in which both motions are known. These plans were available at the
+//! publication of P. Every pair of plans is thus compared once, when the later of the two is published.
 //!
 //! A plan that ends is held, flown on, or unknown ([`PlanEnd`]). Held and continued plans are compared until both have
 //! ended.
 //!
 //! If the positions of the vehicles are recorded too, each plan is also compared with the flights of all other
-//! vehicles. Only the time counts until the next plan of its vehicle starts. The largest distance of each flight from
-//! its own plan is found at the recorded positions.
+//! vehicles, until the next plan of its vehicle replaces it. The largest distance of each flight from its own plan is
+//! found at the recorded positions.
 //!
 //! The distances are those of [`audit`](super::audit): enclosed on curves by Bernstein coefficients, and checked by
-//! parry. A bound on the motion of two plans leaves out those that are neither below their limit nor among the
-//! closest.
+//! parry. A bound on the motion of two plans leaves out pairs that are neither below their limit nor among the closest.
 
+use std::collections::BTreeMap;
+use std::iter;
 use std::mem;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -129,8 +130,8 @@ pub struct PlanApproach {
 /// Separations of plans from other plans, or from flights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSeparations {
-    /// Verdict. It is undecided if nothing was compared, or if the motion of a flight is unknown during a comparison.
-    /// So it is if a vehicle is farther than its limit from its plan when it begins to fly the plan.
+    /// Verdict. Without a violation, the verdict is undecided if nothing was compared, or if the motion of a flight is
+    /// unknown during a comparison. The same holds if a vehicle begins to fly a plan farther than its limit from it.
     pub status: Status,
     /// Number of comparisons of a plan with a plan, or with a flight. A comparison of two vehicles that are on the
     /// ground throughout does not count.
@@ -386,7 +387,7 @@ impl PlanAuditor {
     fn compare(&mut self, known: &Known, other: usize, conflicts: &mut Vec<PlanConflict>) {
         let plans = mem::take(&mut self.fleet[other]);
         let ends = plans.iter().map(|plan| plan.to_s.min(plan.until_s)).fold(known.to_s, f64::max);
-        // A vehicle whose plan has ended at its publication is where the plan has led it.
+        // If both plans have ended at the publication, the vehicles are compared at this instant.
         let ends = if self.end == PlanEnd::Unknown { ends } else { ends.max(known.reference.published_s) };
         for plan in &plans {
             self.compare_two(known, plan, ends, conflicts);
@@ -403,7 +404,7 @@ impl PlanAuditor {
             return;
         }
         let [motion, other_motion] = [known, other].map(|plan| plan.motion(self.end, window.to_s));
-        if !self.published.judges(&motion, &other_motion, window) {
+        if !self.published.count_judged(&motion, &other_motion, window) {
             return;
         }
         // A held point is in the box of its plan.
@@ -420,7 +421,7 @@ impl PlanAuditor {
     /// Returns the verdict over all plans and flights.
     ///
     /// # Errors
-    /// [`RecordedError`] if the flights are those of other vehicles than the plans, or the work is interrupted.
+    /// [`RecordedError`] if vehicles may have exchanged names in plans and flights, or the work is interrupted.
     pub fn finish(mut self) -> Result<PlansOutcome, RecordedError> {
         let (mut flown, mut tracking_error) = (None, None);
         if let Some(flights) = self.flights.take() {
@@ -457,7 +458,7 @@ impl PlanAuditor {
                 let (radius_m, tail) = (flights.radius_m(other), None);
                 let flight = Motion { segments: &part.segments, chords: &part.chords, tail, radius_m };
                 let motion = plan.motion(self.end, to_s);
-                if !comparisons.judges(&motion, &flight, window) {
+                if !comparisons.count_judged(&motion, &flight, window) {
                     continue;
                 }
                 comparisons.compare((plan.reference, &motion), (Counterpart::Flight(other), &flight), window);
@@ -478,32 +479,30 @@ impl PlanAuditor {
     /// Refuses plans whose vehicles may have exchanged names. At the starts of its plans each of these vehicles is, on
     /// average, farther away from its own plans than another one of them, or than a vehicle without plans.
     fn refuse_exchanged(&self, flights: &Flights, plans: &[Known]) -> Result<(), RecordedError> {
-        let vehicles = flights.count();
-        // Sums of the distances from the own flight and from another one, by planned and by other vehicle.
-        let mut sums = vec![[0.0; 2]; vehicles * vehicles];
+        // By planned and by other vehicle: the distances from the own flight less those from the other one.
+        let mut excess: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
         for plan in plans {
             let (vehicle, start_s) = (plan.reference.vehicle, plan.flown().from_s);
-            let Some(planned) = plan.position(self.end, start_s).filter(|_| vehicle < vehicles) else { continue };
-            let Some(own) = flights.position(vehicle, start_s) else { continue };
-            for other in 0..vehicles {
-                let Some(place) = flights.position(other, start_s) else { continue };
-                let sums = &mut sums[vehicle * vehicles + other];
-                sums[0] += flights.distance_m(planned, own);
-                sums[1] += flights.distance_m(planned, place);
+            let excess = excess.entry(vehicle).or_insert_with(|| vec![0.0; flights.count()]);
+            let both = plan.position(self.end, start_s).zip(flights.position(vehicle, start_s));
+            let Some((planned, own)) = both else { continue };
+            for (other, excess) in excess.iter_mut().enumerate() {
+                if let Some(place) = flights.position(other, start_s) {
+                    *excess += flights.distance_m(planned, own) - flights.distance_m(planned, place);
+                }
             }
         }
-        let nearest = |vehicle: usize| {
-            let gain = |other: usize| sums[vehicle * vehicles + other][0] - sums[vehicle * vehicles + other][1];
-            (0..vehicles).max_by(|a, b| gain(*a).total_cmp(&gain(*b))).filter(|other| gain(*other) > 0.0)
-        };
-        let nearest: Vec<_> = (0..vehicles).map(nearest).collect();
-        for start in 0..vehicles {
-            let chain = std::iter::successors(nearest[start], |vehicle| nearest[*vehicle]).take(vehicles);
-            let has_plan = |vehicle: usize| plans.iter().any(|plan| plan.reference.vehicle == vehicle);
-            let is_exchanged = chain.clone().any(|vehicle| vehicle == start)
-                || chain.last().is_some_and(|vehicle| nearest[vehicle].is_none() && !has_plan(vehicle));
-            if let Some(other) = nearest[start].filter(|_| is_exchanged) {
-                let (vehicle, other) = (flights.name(start), flights.name(other));
+        let nearest = excess.iter().filter_map(|(vehicle, excess)| {
+            let (other, most) = excess.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+            (*most > 0.0).then_some((*vehicle, other))
+        });
+        let nearest: BTreeMap<usize, usize> = nearest.collect();
+        for (vehicle, other) in &nearest {
+            let chain = iter::successors(Some(*other), |next| nearest.get(next).copied()).take(flights.count());
+            let is_exchanged = chain.clone().any(|next| next == *vehicle)
+                || chain.last().is_some_and(|last| !excess.contains_key(&last));
+            if is_exchanged {
+                let (vehicle, other) = (flights.name(*vehicle), flights.name(*other));
                 return Err(RecordedError::ExchangedFlights { vehicle, other });
             }
         }

@@ -503,8 +503,8 @@ pub enum RecordedError {
         /// Problem.
         what: String,
     },
-    /// A vehicle has plans and a clock offset: the offset moves its positions, and not the publications of its plans.
-    #[error("{OFFSET}: vehicle {vehicle} has published plans, whose publication has another clock")]
+    /// A vehicle has a clock offset in a recording with plans: the offset moves positions only.
+    #[error("{OFFSET}: the recording has published plans, whose publication has another clock (vehicle {vehicle})")]
     OffsetOfPlans {
         /// Name of the vehicle.
         vehicle: String,

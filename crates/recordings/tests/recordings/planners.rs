@@ -623,7 +623,8 @@ fn all_curves_decide_whether_log_times_have_the_clock_of_the_starts() {
     let late = [logged(&spline(4, 0, 0.0), 6.0), logged(&later(5, 1, 1.0), 7.0)];
     assert_eq!(instants(&late), (vec![0.0, 1.0], at_starts.to_vec()));
     let some = [late[0].clone(), logged(&later(5, 1, 1.0), 0.5)];
-    assert_eq!(instants(&some), (vec![0.5, 6.0], vec![]));
+    let assumed = "plans are published at their log times, up to 6.000 s after their starts, from which they are flown";
+    assert_eq!(instants(&some), (vec![0.5, 6.0], vec![assumed.to_owned()]));
     // Starts of two clocks.
     let mut stray = spline(5, 0, 1.0);
     stray.3 = (0, 0);

@@ -50,7 +50,7 @@ pub(super) struct PublishedPlans {
     /// Time of this machine since 1970 at time 0 of the caller \[ns\].
     machine_ns: Option<i64>,
     /// Time of the planners' clock at time 0 here \[ns\].
-    zero_ns: i64,
+    zero_ns: Option<i64>,
     /// Time of the caller's clock less that of the planners' clock, at the last plan \[s\].
     offset_s: f64,
 }
@@ -68,7 +68,7 @@ struct Drone {
 }
 
 impl PublishedPlans {
-    fn new(delta_m: f64, end: PlanEnd, start_ns: i64) -> Result<Self, Problem> {
+    fn new(delta_m: f64, end: PlanEnd) -> Result<Self, Problem> {
         let auditor = PlanAuditor::new(recorded::Settings::delta(delta_m), end).map_err(|error| wrong(&error))?;
         Ok(Self {
             auditor,
@@ -80,7 +80,7 @@ impl PublishedPlans {
             are_held: true,
             clock: PlanClock::Positions,
             machine_ns: None,
-            zero_ns: start_ns.div_euclid(NS_PER_S).saturating_mul(NS_PER_S),
+            zero_ns: None,
             offset_s: 0.0,
         })
     }
@@ -106,7 +106,7 @@ impl PublishedPlans {
         match known.seen.iter().find(|(seen_ns, _)| seen_ns == start_ns) {
             // A plan among older starts may be a repetition.
             None if known.forgotten_ns.is_some_and(|forgotten_ns| *start_ns <= forgotten_ns) => Err(wrong(&format!(
-                "drone {drone} has {MOST_SEEN} newer plans than that which starts at {start_ns} ns"
+                "drone {drone}: a new plan must start after all plans before the newest {MOST_SEEN}, got {start_ns} ns"
             ))),
             None => Ok(false),
             Some((_, known)) if *known == digest(plan) => Ok(true),
@@ -129,7 +129,10 @@ impl PublishedPlans {
         let over = drone.starts_s.partition_point(|other_s| *other_s <= published_s).saturating_sub(1);
         drone.starts_s.drain(..over);
         if drone.starts_s.partition_point(|other_s| *other_s < start_s) >= MOST_VALID {
-            return Err(wrong(&format!("drone {} has {MOST_VALID} plans that start before it", plan.drone)));
+            return Err(wrong(&format!(
+                "drone {} has {MOST_VALID} valid or later plans that start before this plan",
+                plan.drone
+            )));
         }
         let pieces = plan.pieces.iter().map(|piece| Piece {
             vehicle: index,
@@ -189,7 +192,7 @@ impl Monitor {
         let end = self.settings.plan_end.unwrap_or(PlanEnd::Hold);
         let plans = match &mut self.plans {
             Some(plans) => plans,
-            none => none.insert(PublishedPlans::new(self.settings.delta_m, end, plan.start_ns)?),
+            none => none.insert(PublishedPlans::new(self.settings.delta_m, end)?),
         };
         if plans.is_repeated(plan)? {
             return Ok(());
@@ -205,7 +208,8 @@ impl Monitor {
             self.fault(Fault::TooManyVehicles, None, *arrival_s);
             return Ok(());
         }
-        let planned_s = plan.start_ns.saturating_sub(plans.zero_ns) as f64 * 1e-9;
+        let zero_ns = *plans.zero_ns.get_or_insert(plan.start_ns.div_euclid(NS_PER_S).saturating_mul(NS_PER_S));
+        let planned_s = plan.start_ns.saturating_sub(zero_ns) as f64 * 1e-9;
         let published_s = planned_s - (start_s - now_s);
         // With an inferred clock, a plan that seems to be late is judged from its start on.
         let published_s = if clock == PlanClock::Machine { published_s.min(planned_s) } else { published_s };

@@ -189,6 +189,18 @@ fn the_clock_of_positions_moves_no_plan_against_another() {
 }
 
 #[test]
+fn a_refused_plan_does_not_coarsen_the_times_of_others() {
+    let mut monitor = monitor(settings());
+    take(&mut monitor, along(-1.6e9), 0.0).expect_err("another clock");
+    // At 1000 and 2000 m/s both are at the origin after 4.1 s.
+    take(&mut monitor, plan(0, 0.1, [-4000.0, 0.0, 1.0], [1000.0, 0.0, 0.0], 8.0), 0.1).expect("a plan");
+    take(&mut monitor, plan(1, 0.2, [0.0, 7800.0, 1.0], [0.0, -2000.0, 0.0], 8.0), 0.2).expect("a plan");
+    let found = conflicts(&mut monitor);
+    let [(Event::PlanConflict { conflict, .. }, ..)] = &found[..] else { panic!("{found:?}") };
+    assert!(conflict.upper_m < 1e-5, "{conflict:?}");
+}
+
+#[test]
 fn an_undecided_plan_is_announced() {
     // The two pass each other at exactly 1 m, on curves.
     let bent = |drone: i32, y_m: f64, sign: f64| {
@@ -210,7 +222,10 @@ fn an_undecided_plan_is_announced() {
     let (found, state) = judged(1.0);
     let [(Event::PlanConflict { conflict, .. }, json, text)] = &found[..] else { panic!("{found:?}") };
     assert!(conflict.min_at_s.is_none() && conflict.lower_m < 1.0 && conflict.upper_m >= 1.0, "{conflict:?}");
-    assert!(text.contains(" may come to ") && json["min_at_s"].is_null(), "{text} {json}");
+    assert!(
+        text.contains(" may come to ") && text.contains("possibly closer") && json["min_at_s"].is_null(),
+        "{text} {json}"
+    );
     assert!(matches!(state, State::Undecided(Reason::PlanConflict(_))), "{state:?}");
     // Negative twin.
     let (found, state) = judged(1.001);

@@ -60,7 +60,7 @@ pub(super) fn curve_kind(schema: &str, definition: &str) -> Option<CurveKind> {
     if definition.is_empty() {
         return named.map(|(kind, ..)| *kind);
     }
-    // All have the number of a drone. Bags have other definitions too, and one is asked for at each message.
+    // All kinds have the number of a drone. This test skips other definitions quickly, as it runs for each message.
     let is_candidate = named.is_some() || definition.contains("drone_id");
     let fields = is_candidate.then(|| Definition::new(schema, definition).fields())?;
     let found = KNOWN.iter().find(|(.., known)| *known == fields).map(|(kind, ..)| *kind);

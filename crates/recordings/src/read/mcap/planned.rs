@@ -1,11 +1,11 @@
 //! Reads curves of planners: `traj_utils/msg/Bspline` and `traj_utils/msg/MultiBsplines` of EGO-Planner, and
-//! `traj_utils/msg/MINCOTraj` and `traj_utils/msg/PolyTraj` of its version 2. The definitions in the bag decide. In the
-//! JSON of a live source, which has no definitions, the fields decide.
+//! `traj_utils/msg/MINCOTraj` and `traj_utils/msg/PolyTraj` of its version 2. The definitions in the bag decide
+//! how messages are read. A live source in JSON has no definitions; there the fields decide.
 //!
 //! A curve of a drone is flown from its start until the next one of that drone starts. The whole curve is a published
-//! plan ([`Published`]). Beside topics of positions, these are the flight, and curves are plans alone. The trajectory
-//! server of the first version holds the last point of a curve. That of the second version sends nothing after the end:
-//! that the drone holds the last point is a default there.
+//! plan ([`Published`]). In a recording with positions, the positions are the flight and the curves are plans. The
+//! trajectory server of the first version holds the last point of a curve. The server of the second version sends
+//! nothing after the end; by default the drone holds the last point.
 //!
 //! A B-spline has its degree in `order`, and its time 0 at the knot with this index. A MINCO trajectory of order 5 is
 //! the curve of least jerk through its points. A polynomial trajectory of order 5 has six coefficients of each piece,
@@ -150,6 +150,12 @@ impl PlannerCurves {
             Fact::name(FactKind::Identity, fact::Source::Deduced, "numbers of drones in messages"),
         ];
         facts.extend(self.facts(options));
+        if let Some(late_s) = self.late_s() {
+            let published =
+                format!("their log times, up to {late_s:.3} s after their starts, from which they are flown");
+            facts.retain(|fact| fact.kind != FactKind::PlanPublication);
+            facts.push(Fact::name(FactKind::PlanPublication, fact::Source::Default, published));
+        }
         let indices = self.drones.keys().enumerate().map(|(vehicle, drone)| (*drone, vehicle)).collect();
         let plans = self.published_plans(&indices, epoch_ns, options.metres())?;
         Ok(Curves::with_plans(vehicles, Metadata { clock, facts, ..Metadata::in_seconds(notes) }, plans))
@@ -191,14 +197,21 @@ impl PlannerCurves {
         undefined.into_iter().chain((self.repeated > 0).then_some(repeated))
     }
 
-    /// Returns the clock of log times and starts. Recorders write log times by their own clock, planners in simulations
-    /// start by the simulated one.
+    /// Returns whether log times and starts have one clock. Recorders write log times by their own clock. Planners in
+    /// simulations start by the simulated clock.
     ///
-    /// The times from the publications of curves to their starts decide. With one clock some curve starts within a
-    /// minute, and some is published before its start or soon after it.
+    /// One clock needs a curve that starts within a minute of its log time, and a curve that is logged at most a second
+    /// after its start.
     fn is_one_clock(&self) -> bool {
         let leads = || self.drones.values().flatten().map(|(start_ns, curve)| start_ns.saturating_sub(curve.log_ns));
         leads().any(|lead_ns| lead_ns.abs() <= ONE_CLOCK_NS) && leads().any(|lead_ns| lead_ns >= -LATEST_NS)
+    }
+
+    /// Returns the longest time from a start to its publication, if this is no delay of planners in time \[s\].
+    fn late_s(&self) -> Option<f64> {
+        let late = self.drones.values().flatten().map(|(start_ns, curve)| curve.log_ns.saturating_sub(*start_ns));
+        let late_ns = late.max().filter(|late_ns| *late_ns > LATEST_NS && self.is_one_clock())?;
+        Some(late_ns as f64 / NS_PER_S as f64)
     }
 
     /// Returns the curves with instants of publication \[ns\] and drones, in order of publication.
@@ -317,8 +330,8 @@ fn one_kind() -> String {
 /// Returns the vehicles of drones by the numbers in their names.
 ///
 /// Names are compared number by number. Of the names with a number, all must have a number at the same position, such
-/// as the first, and these must differ. Each drone must have one of them. All such positions must
-/// give the same vehicles.
+/// as the first, and these must differ. Each drone must have one of them. All such positions must give the same
+/// vehicles.
 fn vehicles_of(drones: &[i32], names: &[String]) -> Result<BTreeMap<i32, usize>, Fault> {
     let numbers = |(index, name): (usize, &String)| {
         let numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());

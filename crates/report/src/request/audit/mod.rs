@@ -185,14 +185,18 @@ impl ConfiguredAudit<'_> {
         let is_planar = recording.is_planar();
         let level = places::refuse_unknown(request, self.asked_by(), &settings, recording.as_ref())?;
         request.refuse_guessed_seconds(&settings, recording.clock(), &items)?;
-        let plan_auditor = request.plan_auditor(recording.as_ref(), &settings, monitor)?;
+        let mut plan_auditor = request.plan_auditor(recording.as_ref(), &settings, monitor)?;
         monitor.begin(&called, None);
         let (mut curves, mut span) = (true, ItemSpan::default());
         loop {
             level.check(&called, recording.vehicles(), &items)?;
             curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
             span.add(&items);
-            auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
+            let failed = |error| Failure::from(error).of(Path::new(&called));
+            auditor.push(recording.vehicles(), &items).map_err(failed)?;
+            if let Some(auditor) = &mut plan_auditor {
+                auditor.push_flights(recording.vehicles(), &items).map_err(failed)?;
+            }
             if let Some(instants) = &mut instants {
                 instants.note(&items, recording.vehicles(), &settings);
             }
@@ -211,10 +215,8 @@ impl ConfiguredAudit<'_> {
         if clock.inferred && facts.iter().all(|fact| fact.kind != FactKind::TimeUnit) {
             facts.push(Fact::name(FactKind::TimeUnit, FactSource::Inferred, &clock.unit));
         }
-        let flights = (!curves).then_some(&settings);
         let plan_auditor = plan_auditor.filter(|_| outcome.separation.is_some());
-        let judge = |auditor| request.judge_plans(recording.as_ref(), auditor, flights, monitor);
-        let plans = plan_auditor.map(judge).transpose()?;
+        let plans = plan_auditor.map(|auditor| request.judge_plans(recording.as_ref(), auditor)).transpose()?;
         let notes = recording.notes().to_vec();
         request.check_count(&outcome, &settings)?;
         side_files.check(&settings, &outcome)?;
