@@ -233,7 +233,13 @@ fn flights_with_gaps_are_undecided() {
     assert_eq!(flown(&delta, &plans, &[own.clone(), gap.clone()]).status, Status::Undecided);
     // The gap does not matter for a plan that is published after it.
     let after = [along_x(0, 7.0, 7.0, 10.0, 7.0, 0.0)];
-    assert_eq!(flown(&delta, &after, &[own.clone(), gap]).status, Status::Clear);
+    assert_eq!(flown(&delta, &after, &[own.clone(), gap.clone()]).status, Status::Clear);
+    // The judged time begins, ends, or lies within the gap.
+    for (from_s, until_s) in [(5.0, 10.0), (0.0, 5.0), (4.5, 5.5)] {
+        let cut = Settings { from_s: Some(from_s), until_s: Some(until_s), ..delta.clone() };
+        assert_eq!(flown(&cut, &plans, &[own.clone(), gap.clone()]).status, Status::Undecided, "{from_s} {until_s}");
+        assert_eq!(flown(&cut, &plans, &[own.clone(), whole.clone()]).status, Status::Clear, "{from_s} {until_s}");
+    }
     // Nothing is compared with a vehicle that has left.
     let left = whole.iter().filter(|item| item.time_s() < 5.0).cloned().collect();
     let found = flown(&delta, &after, &[own, left]);
