@@ -2,7 +2,7 @@
 # Sets up and runs tests. From anywhere:
 #
 #   sh tests/run.sh [arguments of cargo test]   the tests of the crates and of the program
-#   sh tests/run.sh --long                      all phases
+#   sh tests/run.sh --change | --long           the phases of a change, or all
 #   sh tests/run.sh --only PHASE...             some phases
 #
 # CONTRIBUTING.md lists the phases. TAUTLINE_LONG=1 adds random cases, an hour of fuzzing, and the slowest commands of
@@ -10,7 +10,9 @@
 set -eu
 cd "$(dirname "$0")/.."
 
-all="crates ignored bits film fuzz mutants proofs ci cluster docs readers python"
+change="crates ignored bits film proofs ci cluster docs readers python"
+# These compile all crates again.
+all="$change fuzz mutants"
 # The Python package and the fuzz targets have tests of their own.
 rust="--workspace --exclude tautline-python --exclude tautline-fuzz"
 
@@ -81,11 +83,13 @@ phase() {
 
 phases=crates
 case ${1:-} in
-    --long)
-        echo "tests: set-up, build and all tests, some 50 minutes on two cores"
-        phases=$all
+    --change | --long)
+        phases=$change
+        [ "$1" = --change ] || phases=$all
+        option=$1
         shift
-        [ $# = 0 ] || { echo "--long: takes no arguments, got $*" >&2 && exit 2; }
+        [ $# = 0 ] || { echo "$option: takes no arguments, got $*" >&2 && exit 2; }
+        echo "tests: set-up, build and $phases"
         ;;
     --only)
         shift

@@ -1,9 +1,9 @@
 #!/bin/sh
 # Installs the missing requirements of builds and tests, except for the Rust toolchain.
-# From anywhere: sh tests/setup.sh [--long | PHASE...]
+# From anywhere: sh tests/setup.sh [PHASE...]
 #
-# --long installs those of all phases of tests/run.sh. Without arguments: those of the phase `crates`. One tool of each
-# of the phases `ci`, `docs` and `fuzz` is built from source. `lint` needs a compiler and Python only.
+# Without arguments: those of the phase `crates` of tests/run.sh. One tool of each of the phases `ci`, `docs` and `fuzz`
+# is built from source. `lint` needs a compiler and Python only.
 set -eu
 cd "$(dirname "$0")/.."
 phases=${*:-crates}
@@ -11,7 +11,7 @@ phases=${*:-crates}
 # Returns whether one of these phases is to be set up.
 needed_by() {
     for phase; do
-        case " $phases " in *" $phase "* | *" --long "*) return 0 ;; esac
+        case " $phases " in *" $phase "*) return 0 ;; esac
     done
     return 1
 }
