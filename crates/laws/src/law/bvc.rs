@@ -59,8 +59,8 @@ impl Default for BvcKeys {
 /// with the least largest violation is taken.
 ///
 /// # Guarantee
-/// None. Velocities V that are taken on at once and held for at most 1/k keep D: vehicles stay in their cells, which are
-/// convex. Velocity tracking and acceleration limits break this. Vehicles may deadlock at the boundaries of their
+/// None. Velocities V that are taken on at once and held for at most 1/k keep D: vehicles stay in their cells, which
+/// are convex. Velocity tracking and acceleration limits break this. Vehicles may deadlock at the boundaries of their
 /// cells; the rules of the source against deadlocks are not a part of this law.
 ///
 /// # Cost

@@ -167,7 +167,8 @@ proptest! {
     /// Braking is in all half-spaces of a vehicle, and in the ball of commands, while all barriers hold.
     #[test]
     fn braking_is_feasible_while_barriers_hold(
-        a22_per_s in drags(), own_m_s in velocities(), others in prop::collection::vec((vectors(3.0), velocities()), 1..8),
+        a22_per_s in drags(), own_m_s in velocities(),
+        others in prop::collection::vec((vectors(3.0), velocities()), 1..8),
     ) {
         let braking = braking(a22_per_s);
         prop_assume!(own_m_s.norm() <= 3.0);
