@@ -208,14 +208,6 @@ struct Crowd {
     a22_per_s: f64,
 }
 
-/// Result of a flight of a crowd.
-struct Flown {
-    /// Smallest separation at the steps \[m\].
-    least_m: f64,
-    /// Whether all vehicles are within 0.1 m of their slots at the end.
-    arrived: bool,
-}
-
 impl Crowd {
     /// Returns moving vehicles whose slots have no relation to their starts.
     fn random(seed: u64, count: usize, is_planar: bool, a22_per_s: f64) -> Self {
@@ -264,18 +256,20 @@ impl Crowd {
         Self { start: Swarm { positions_m, velocities_m_s }, formation, a22_per_s }
     }
 
-    /// Flies the crowd with commands that are held for a step.
-    fn fly(&self, keys: &CbfQpKeys, step_s: f64) -> Flown {
+    /// Flies the crowd with commands that are held for a step. Returns the smallest separation at the steps \[m\].
+    fn fly(&self, keys: &CbfQpKeys, step_s: f64) -> f64 {
         let (mut swarm, count) = (self.start.clone(), self.start.count());
         let links = Graph::complete(count);
         let context = LawContext::new(&links, &self.formation, DELTA_M, self.a22_per_s);
         let mut law = CbfQpLaw::new(&context, keys.clone()).expect("a law");
         let (mut near, mut command, mut least_m) = (CellList::default(), Rows::zeros(count), f64::INFINITY);
-        for _ in 0..(DURATION_S / step_s) as u32 {
+        let mut time_s = 0.0;
+        while time_s < DURATION_S {
+            time_s += step_s;
             near.update(&swarm.positions_m, law.range_m);
             let at = Observation { near: near.pairs(), ..Observation::exact(&swarm, &links, &self.formation) };
             if law.command(&at, &mut command).is_err() {
-                return Flown { least_m: 0.0, arrived: false };
+                return 0.0;
             }
             for i in 0..count {
                 let (position_m, velocity_m_s) = (row(&swarm.positions_m, i), row(&swarm.velocities_m_s, i));
@@ -287,8 +281,7 @@ impl Crowd {
             }
             least_m = least_m.min(closest_pair(&swarm.positions_m).map_or(f64::INFINITY, |(_, apart_m)| apart_m));
         }
-        let missing_m = &swarm.positions_m - &self.formation.slots_m;
-        Flown { least_m, arrived: (0..count).all(|i| row(&missing_m, i).norm() < 0.1) }
+        least_m
     }
 }
 
@@ -308,23 +301,22 @@ fn keys(variant: CbfQpVariant, margin_m: Option<f64>) -> CbfQpKeys {
     CbfQpKeys { variant, max_speed_m_s: 3.0, margin_m, ..CbfQpKeys::default() }
 }
 
-/// Smallest separation of crowds \[m\], and the number of those that violate and arrive.
-fn flown(rounds: u64, keys: &CbfQpKeys, step_s: f64) -> (f64, u32, u32) {
+/// Returns the smallest separation of crowds \[m\], and the number of those that violate.
+fn flown(rounds: u64, keys: &CbfQpKeys, step_s: f64) -> (f64, u32) {
     let flights = crowds(rounds).map(|crowd| crowd.fly(keys, step_s));
-    flights.fold((f64::INFINITY, 0, 0), |(least_m, violating, arrived), flight| {
-        let violates = u32::from(flight.least_m < DELTA_M);
-        (least_m.min(flight.least_m), violating + violates, arrived + u32::from(flight.arrived))
+    flights.fold((f64::INFINITY, 0), |(closest_m, violating), least_m| {
+        (closest_m.min(least_m), violating + u32::from(least_m < DELTA_M))
     })
 }
 
 #[test]
 fn crowds_keep_delta_under_braking_barriers_and_not_under_nominal_ones() {
     let rounds = if std::env::var_os("TAUTLINE_LONG").is_some() { 200 } else { 10 };
-    let (least_m, _, arrived) = flown(rounds, &keys(CbfQpVariant::Braking, Some(0.0)), 0.01);
-    let (nominal_m, violating, _) = flown(rounds, &keys(CbfQpVariant::Nominal, None), 0.01);
-    println!("of {} crowds: least {least_m} m, {arrived} arrive; nominal: {nominal_m} m, {violating}", 3 * rounds);
+    let (least_m, _) = flown(rounds, &keys(CbfQpVariant::Braking, Some(0.0)), 0.01);
+    let (nominal_m, violating) = flown(rounds, &keys(CbfQpVariant::Nominal, None), 0.01);
     assert!(least_m > DELTA_M - 1e-9, "{least_m}");
-    assert!(u64::from(violating) >= rounds, "nominal barriers violate in {violating} of {}", 3 * rounds);
+    let is_expected = u64::from(violating) >= rounds + rounds / 2 && nominal_m < 0.855;
+    assert!(is_expected, "nominal barriers violate in {violating} of {}: {nominal_m} m", 3 * rounds);
 }
 
 /// The braking rate at low speed is 20/s: commands that are held for more than its inverse break the barriers.
@@ -332,8 +324,7 @@ fn crowds_keep_delta_under_braking_barriers_and_not_under_nominal_ones() {
 fn commands_that_are_held_for_long_break_the_barriers() {
     let keys = keys(CbfQpVariant::Braking, Some(0.0));
     let losses_m = [0.2, 0.1, 0.05, 0.025].map(|step_s| DELTA_M - flown(10, &keys, step_s).0);
-    println!("losses at steps of 0.2, 0.1, 0.05 and 0.025 s: {losses_m:?} m");
-    assert!(losses_m[0] > 0.1 && losses_m[1] > 0.01, "{losses_m:?}");
+    assert!((losses_m[0] - 0.796).abs() < 0.005 && (losses_m[1] - 0.0355).abs() < 0.001, "{losses_m:?}");
     assert!(losses_m[2..].iter().all(|&loss_m| loss_m < 1e-9), "{losses_m:?}");
 }
 
