@@ -1,7 +1,7 @@
 //! Prints the table of arrivals, which docs/shield.md shows in part: laws without and under the shield, and behind a
 //! radio that loses messages, from random starts of several kinds.
 //!
-//! `cargo run --release --example arrivals [RUNS]`, 20 runs of each by default.
+//! `cargo run --release --example arrivals [RUNS [LAW...]]`, 20 runs of each law by default.
 
 use tautline::compare::{LawRow, Options};
 use tautline::request::{ScenarioRequest, Silent};
@@ -14,13 +14,16 @@ struct Kind {
     tables: String,
 }
 
-/// Laws that steer each vehicle to its slot.
-const LAWS: [&str; 4] = ["laplacian", "displacement", "orca", "cbf-qp"];
+/// Laws that steer each vehicle to its slot; `braking` is a variant of `cbf-qp`.
+const LAWS: [&str; 6] = ["laplacian", "displacement", "orca", "bvc", "cbf-qp", "braking"];
 /// Common tables: 60 s with commands up to 5 m/s^2 in steps of a quarter of the shield's period.
 const COMMON: &str = "
     [law]
     kind = \"displacement\"
     delta_m = 1.0
+    [laws.braking]
+    kind = \"cbf-qp\"
+    variant = \"braking\"
     [time]
     duration_s = 60
     dt_s = 0.0125
@@ -116,14 +119,17 @@ fn cell(rows: &[LawRow], number: impl Fn(&LawRow) -> String) -> String {
 }
 
 fn main() {
-    let runs = std::env::args().nth(1).and_then(|runs| runs.parse().ok()).unwrap_or(20);
+    let mut arguments = std::env::args().skip(1);
+    let runs = arguments.next().and_then(|runs| runs.parse().ok()).unwrap_or(20);
+    let named: Vec<_> = arguments.collect();
+    let laws = if named.is_empty() { LAWS.map(str::to_owned).to_vec() } else { named };
     let median = |row: &LawRow| row.reached_median_s.value.map_or("-".to_owned(), |at_s| format!("{at_s:.0}"));
-    println!("Of {runs} flights each, under {}:\n", LAWS.join(" / "));
+    println!("Of {runs} flights each, under {}:\n", laws.join(" / "));
     let columns = ["bare: violate", "shield: violate", "bare: reach", "shield: reach", "median [s]", "radio: reach"];
     println!("| start | {} | median [s] |", columns.join(" | "));
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for kind in kinds() {
-        let named = |ending: &str| LAWS.iter().map(|law| format!("{law}{ending}")).collect::<Vec<_>>();
+        let named = |ending: &str| laws.iter().map(|law| format!("{law}{ending}")).collect::<Vec<_>>();
         let bare = compared(&kind, &named("+bare"), &[], runs);
         let shield = compared(&kind, &named("+shield"), &[], runs);
         let radio = compared(&kind, &named("+shield"), &RADIO, runs);

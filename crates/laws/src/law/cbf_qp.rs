@@ -1,13 +1,14 @@
 //! Control barrier functions: the acceleration nearest to that of a nominal controller that keeps every pair able to
 //! brake.
 //!
-//! This is the nominal variant of L. Wang, A. D. Ames and M. Egerstedt (IEEE Transactions on Robotics 33, 661, 2017):
-//! its pairwise barriers. Section VI of the paper adds barriers of braking (15) and a braking controller (17), which
-//! keep the program feasible. They are not a part of this law.
+//! The nominal variant has the pairwise barriers of L. Wang, A. D. Ames and M. Egerstedt (IEEE Transactions on Robotics
+//! 33, 661, 2017). Their program may be infeasible. Section VI of the paper therefore adds barriers of braking (15) and
+//! a braking controller (17). The braking variant follows this idea; its equations are derived in [`braking`].
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use self::braking::Braking;
 use super::certificate::{Certificate, VoidReason};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
@@ -20,33 +21,93 @@ use crate::space::NearLists;
 use tautline_core::half_spaces::{HalfSpace, HalfSpaces};
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
+mod braking;
+
 /// Smallest clearance used for a pair, as a fraction of delta: the slope of the barrier is infinite at clearance 0.
 const LEAST_CLEARANCE: f64 = 1e-6;
+
+/// Default margin of the braking variant, as a fraction of delta.
+const MARGIN: f64 = 0.01;
+/// Default rate coefficient kappa of the braking variant \[1/s\].
+const APPROACH_PER_S: f64 = 5.0;
+
+/// Barrier of a pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CbfQpVariant {
+    /// Braking of both vehicles along their line of sight. Several pairs can be infeasible together.
+    #[default]
+    Nominal,
+    /// Distance of the braking segments of both vehicles. Braking stays feasible, and replaces an infeasible command.
+    Braking,
+}
 
 /// Keys of `[law]` with `kind = "cbf-qp"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CbfQpKeys {
+    /// Barrier of a pair.
+    pub variant: CbfQpVariant,
     /// Gain of the nominal controller on the way to the slot in 1/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s2: f64,
     /// Gain of the nominal controller on velocity in 1/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub c_per_s: f64,
-    /// Largest speed of the nominal controller in m/s.
+    /// Largest speed of the nominal controller in m/s; in the braking variant of the vehicle, with the reference.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_speed_m_s: f64,
     /// Largest commanded acceleration in m/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: f64,
-    /// Rate coefficient gamma of the barrier in s/m^2: h' >= -gamma h^3.
+    /// Rate coefficient gamma of the nominal barrier in s/m^2: h' >= -gamma h^3. The braking variant does not use it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub gamma_s_per_m2: f64,
+    /// Rate coefficient kappa of the braking barrier in 1/s: h' >= -kappa h; by default 5. A quarter of the rate at
+    /// which a slow vehicle brakes. Only with `variant = "braking"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub approach_per_s: Option<f64>,
+    /// Distance that vehicles keep beyond delta in m; by default a hundredth of delta. Only with
+    /// `variant = "braking"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0))]
+    pub margin_m: Option<f64>,
 }
 
 impl Default for CbfQpKeys {
     fn default() -> Self {
-        Self { k_per_s2: 1.0, c_per_s: 2.0, max_speed_m_s: 2.0, max_accel_m_s2: 5.0, gamma_s_per_m2: 1.0 }
+        Self {
+            variant: CbfQpVariant::Nominal,
+            k_per_s2: 1.0,
+            c_per_s: 2.0,
+            max_speed_m_s: 2.0,
+            max_accel_m_s2: 5.0,
+            gamma_s_per_m2: 1.0,
+            approach_per_s: None,
+            margin_m: None,
+        }
+    }
+}
+
+impl CbfQpKeys {
+    /// Returns the brake of the braking variant; `None` for the nominal variant.
+    fn braking(&self, delta_m: f64, a22_per_s: f64) -> Result<Option<Braking>, ParameterError> {
+        if self.variant == CbfQpVariant::Nominal {
+            let given = [("approach_per_s", self.approach_per_s), ("margin_m", self.margin_m)];
+            return match given.into_iter().find_map(|(name, value)| Some((name, value?))) {
+                Some((name, value)) => Err(ParameterError::OnlyBraking { name, value }),
+                None => Ok(None),
+            };
+        }
+        let braking = Braking {
+            max_accel_m_s2: self.max_accel_m_s2,
+            max_speed_m_s: self.max_speed_m_s,
+            a22_per_s,
+            apart_m: delta_m + self.margin_m.unwrap_or(MARGIN * delta_m),
+            approach_per_s: self.approach_per_s.unwrap_or(APPROACH_PER_S),
+        };
+        braking.check().map(|()| Some(braking))
     }
 }
 
@@ -59,8 +120,9 @@ impl Default for CbfQpKeys {
 /// u_i = acceleration nearest to U_i with |u| <= a_max in all half-spaces of i
 /// ```
 ///
-/// Let A = 2 `a_max` be the joint braking of two vehicles, n the unit vector from vehicle j to vehicle i, l their
-/// separation and w = `v_i - v_j` their relative velocity. A pair is safe while
+/// # Nominal variant
+/// A = 2 `a_max` is the joint braking of two vehicles. The unit vector n points from vehicle j to vehicle i, l is
+/// their separation, and w = `v_i - v_j` their relative velocity. A pair is safe while
 ///
 /// ```text
 /// h = sqrt(2 A (l - delta)) + n . w >= 0
@@ -76,9 +138,18 @@ impl Default for CbfQpKeys {
 /// of delta - l with a negative sign, which parts the pair. If the half-spaces have no common point, the acceleration
 /// with the least largest violation is commanded.
 ///
+/// # Braking variant
+/// The barrier of a pair is the distance of the two braking segments less D = delta + margin. Vehicle i keeps its stop
+/// point on its side of the mid-plane between the segments, and its speed below `v_max` ([`braking`]). If no
+/// acceleration is in all half-spaces, it brakes with up to `a_max` against its velocity.
+///
 /// # Guarantee
-/// None for a swarm. A single pair that starts with h >= 0 keeps delta, in continuous time with a22 = 0. A vehicle with
-/// several neighbours may have no acceleration in all of its half-spaces.
+/// Nominal: none for a swarm. A single pair that starts with h >= 0 keeps delta, in continuous time with a22 = 0. A
+/// vehicle with several neighbours may have no acceleration in all of its half-spaces.
+///
+/// Braking: a swarm keeps D if the segments of all pairs are D apart at the start and no speed exceeds `v_max` then.
+/// States must be exact, commands carried out and time continuous. Drag shortens brakes, and the segments cover
+/// a22 > 0. With commands that are held for long, distances fall below D.
 ///
 /// # Cost
 /// O(near pairs) per step without allocation.
@@ -90,6 +161,8 @@ pub struct CbfQpLaw {
     delta_m: f64,
     a22_per_s: f64,
     range_m: f64,
+    /// Brake of the braking variant.
+    braking: Option<Braking>,
     near: NearLists,
     half_spaces: HalfSpaces,
 }
@@ -99,7 +172,8 @@ impl CbfQpLaw {
     ///
     /// # Errors
     /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
-    /// some vehicle does not know the reference.
+    /// some vehicle does not know the reference. In the nominal variant, if a key of the braking variant is given. In
+    /// the braking variant, if a22 exceeds the brake at the largest speed.
     pub fn new(context: &LawContext<'_>, keys: CbfQpKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
         let gains = [
@@ -108,10 +182,14 @@ impl CbfQpLaw {
             ("max_speed_m_s", keys.max_speed_m_s),
             ("max_accel_m_s2", keys.max_accel_m_s2),
             ("gamma_s_per_m2", keys.gamma_s_per_m2),
+            ("approach_per_s", keys.approach_per_s.unwrap_or_default()),
+            ("margin_m", keys.margin_m.unwrap_or_default()),
         ];
         ParameterError::check(links, formation, &gains)?;
+        let braking = keys.braking(delta_m, a22_per_s)?;
         Ok(Self {
-            range_m: range_m(&keys, delta_m, a22_per_s),
+            range_m: braking.map_or_else(|| range_m(&keys, delta_m, a22_per_s), |braking| braking.range_m()),
+            braking,
             keys,
             reference_use: ReferenceUse::new(context)?,
             count: links.count(),
@@ -136,17 +214,38 @@ impl CbfQpLaw {
     /// Returns the half-space of accelerations of vehicle i that vehicle j allows; `None` out of range.
     fn half_space(&self, observation: &Observation<'_>, i: usize, j: usize) -> Result<Option<HalfSpace>, LawError> {
         let sensed = observation.sensed(i, j);
+        let own_m_s = row(&observation.own.velocities_m_s, i);
         let apart_m = row(&observation.own.positions_m, i) - sensed.position_m;
         let distance_m = apart_m.norm();
+        let collision = LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m };
         if distance_m == 0.0 {
-            return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
+            return Err(collision);
         }
         if distance_m > self.range_m {
             return Ok(None);
         }
+        if let Some(braking) = &self.braking {
+            let own = (row(&observation.own.positions_m, i), own_m_s);
+            return braking.half_space(own, (sensed.position_m, sensed.velocity_m_s)).map(Some).ok_or(collision);
+        }
         let normal = apart_m / distance_m;
-        let bound = self.bound_m_s2(normal, distance_m, row(&observation.own.velocities_m_s, i) - sensed.velocity_m_s);
+        let bound = self.bound_m_s2(normal, distance_m, own_m_s - sensed.velocity_m_s);
         Ok(Some(HalfSpace { normal, offset: -0.5 * bound }))
+    }
+
+    /// Returns the acceleration of vehicle i that is nearest to that of the nominal controller \[m/s^2\], in the
+    /// half-spaces of its pairs.
+    fn chosen_m_s2(&mut self, observation: &Observation<'_>, i: usize) -> Vector3<f64> {
+        let nominal_m_s2 = self.nominal_m_s2(observation, i);
+        let Some(braking) = &self.braking else {
+            return self.half_spaces.nearest(nominal_m_s2, self.keys.max_accel_m_s2).point;
+        };
+        let own_m_s = row(&observation.own.velocities_m_s, i);
+        if let Some(limit) = braking.speed_limit(own_m_s) {
+            self.half_spaces.push(limit);
+        }
+        let chosen_m_s2 = self.half_spaces.nearest_inside(nominal_m_s2, self.keys.max_accel_m_s2);
+        chosen_m_s2.unwrap_or_else(|| braking.command_m_s2(own_m_s))
     }
 
     /// Returns B of a pair \[m/s^2\].
@@ -191,8 +290,8 @@ impl Law for CbfQpLaw {
                     self.half_spaces.push(half_space);
                 }
             }
-            let nominal = self.nominal_m_s2(observation, i);
-            set_row(command, i, self.half_spaces.nearest(nominal, self.keys.max_accel_m_s2).point);
+            let chosen_m_s2 = self.chosen_m_s2(observation, i);
+            set_row(command, i, chosen_m_s2);
         }
         check_range(command)
     }

@@ -222,6 +222,26 @@ pub enum ParameterError {
         /// Value of the gain.
         value: f64,
     },
+    /// A key has no effect in the nominal variant of the law.
+    #[error("{name} is {value}, and only the braking variant uses it")]
+    OnlyBraking {
+        /// Name of the key.
+        name: &'static str,
+        /// Value of the key.
+        value: f64,
+    },
+    /// The velocity coefficient a22 accelerates a vehicle more than its brake decelerates it.
+    #[error(
+        "max_speed_m_s is {max_speed_m_s}, where a22 = {a22_per_s} 1/s takes up the brake of {max_accel_m_s2} m/s^2"
+    )]
+    CannotBrake {
+        /// Largest speed \[m/s\].
+        max_speed_m_s: f64,
+        /// Largest acceleration \[m/s^2\].
+        max_accel_m_s2: f64,
+        /// Velocity coefficient a22 \[1/s\].
+        a22_per_s: f64,
+    },
     /// A slot of the formation is not a finite number.
     #[error("the slot of vehicle {} is not a finite number", vehicle + 1)]
     Slot {

@@ -4,6 +4,7 @@
 //! that scenarios may name. A custom law implements [`Law`] and runs like the built-in ones (see
 //! `examples/own_law.rs`).
 
+mod bvc;
 mod cbf_qp;
 mod certificate;
 mod clearance;
@@ -23,7 +24,8 @@ mod potential;
 mod spec;
 mod tension;
 
-pub use cbf_qp::{CbfQpKeys, CbfQpLaw};
+pub use bvc::{BvcKeys, BvcLaw};
+pub use cbf_qp::{CbfQpKeys, CbfQpLaw, CbfQpVariant};
 pub use certificate::{Certificate, LegBound, VoidReason};
 pub use displacement::{DisplacementKeys, DisplacementLaw};
 pub use edge_tension::{EdgeTensionKeys, EdgeTensionLaw};

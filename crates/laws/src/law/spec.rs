@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::bvc::{BvcKeys, BvcLaw};
 use super::cbf_qp::{CbfQpKeys, CbfQpLaw};
 use super::displacement::{DisplacementKeys, DisplacementLaw};
 use super::edge_tension::{EdgeTensionKeys, EdgeTensionLaw};
@@ -69,6 +70,8 @@ laws! {
     Potential(PotentialKeys) => PotentialLaw,
     /// Tracking of velocities that are reciprocally free of collisions.
     Orca(OrcaKeys) => OrcaLaw,
+    /// Tracking of velocities towards the slot that stay in the vehicle's own buffered Voronoi cell.
+    Bvc(BvcKeys) => BvcLaw,
     /// A controller to the slot, limited by control barrier functions that keep every pair able to brake.
     CbfQp(CbfQpKeys) => CbfQpLaw,
     /// One distance between near vehicles, bounded forces: forms a lattice; slots are not assigned.

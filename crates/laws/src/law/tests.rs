@@ -55,7 +55,8 @@ fn separate_exact_tables_give_the_command_of_the_shared_state() {
 
 #[test]
 fn a_command_depends_only_on_the_tables_of_its_vehicle() {
-    let (swarm, formation) = (swarm(), Formation::grid(COUNT, 2.0));
+    // Vehicles change sides, so that others are in their way.
+    let (swarm, formation) = (swarm(), Formation::points(-Formation::grid(COUNT, 2.0).slots_m));
     let pictures = |vehicle: Option<usize>| {
         let mut held = StateTables {
             received: vec![swarm.clone(); COUNT],
@@ -139,6 +140,6 @@ fn laws_are_named_like_their_kinds() {
     let (links, formation) = (Graph::complete(COUNT), Formation::grid(COUNT, 2.0));
     let specs = LawSpec::all();
     let names: Vec<_> = specs.iter().map(|spec| built(spec, &links, &formation).name().to_owned()).collect();
-    let kinds = ["edge-tension", "displacement", "laplacian", "potential", "orca", "cbf-qp", "flocking"];
+    let kinds = ["edge-tension", "displacement", "laplacian", "potential", "orca", "bvc", "cbf-qp", "flocking"];
     assert_eq!(names, kinds);
 }

@@ -519,6 +519,13 @@ fn of_law(error: &ParameterError) -> ScenarioError {
             let help = "leave it out: then all vehicles know the reference; or add edges to the graph";
             refuse(help, &["reference.known_by", "reference.leader", "graph.edges"])
         }
+        ParameterError::OnlyBraking { name, .. } => {
+            refuse("leave it out, or set law.variant to \"braking\"", &[&format!("law.{name}"), "law.variant"])
+        }
+        ParameterError::CannotBrake { .. } => {
+            let keys = ["law.max_speed_m_s", "law.max_accel_m_s2", "swarm.a22_per_s"];
+            refuse("lower law.max_speed_m_s, or raise law.max_accel_m_s2", &keys)
+        }
         ParameterError::NotFinite { .. } => refuse("give finite numbers", &["law.kind"]),
         ParameterError::Memory { .. } => {
             refuse("use fewer vehicles, or a graph of fewer edges", &["swarm.count", "graph.kind"])

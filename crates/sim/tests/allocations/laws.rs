@@ -5,8 +5,8 @@ use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::{Formation, best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{
-    DisplacementKeys, DisplacementLaw, EdgeTensionKeys, EdgeTensionLaw, LaplacianKeys, LaplacianLaw, Law, LawContext,
-    LawSpec,
+    CbfQpKeys, CbfQpVariant, DisplacementKeys, DisplacementLaw, EdgeTensionKeys, EdgeTensionLaw, LaplacianKeys,
+    LaplacianLaw, Law, LawContext, LawSpec,
 };
 use tautline_laws::observation::Observation;
 use tautline_laws::space::CellList;
@@ -48,7 +48,8 @@ pub(crate) fn a_law_that_senses_allocates_nothing_once_its_lists_have_grown() {
     let (links, formation) = (Graph::ring(30), Formation::sphere(30, 6.0));
     let crowd = Swarm::at_rest(Formation::sphere(30, 3.0).slots_m);
     let mut control = Rows::zeros(30);
-    for spec in LawSpec::all() {
+    let braking = LawSpec::CbfQp(CbfQpKeys { variant: CbfQpVariant::Braking, ..CbfQpKeys::default() });
+    for spec in LawSpec::all().into_iter().chain([braking]) {
         let context = LawContext::new(&links, &formation, 0.8, 0.1);
         let mut law = spec.complete(0.1).build(&context).expect("a law");
         let mut near = CellList::default();

@@ -60,6 +60,7 @@ fn a_reference_that_the_law_cannot_follow_is_refused() {
         ("laplacian", ""),
         ("potential", ""),
         ("orca", "leader = 2\n"),
+        ("bvc", "leader = 2\n"),
         ("cbf-qp", "known_by = [1, 2]\n"),
         ("flocking", "known_by = [3]\n"),
         ("orca", "[deadlock]\nmode = \"start\"\n"),
@@ -68,7 +69,7 @@ fn a_reference_that_the_law_cannot_follow_is_refused() {
         assert_eq!(error.code(), "scenario/unsupported-by-law", "{law}: {error}");
         assert!(!error.help.is_empty() && error.place.is_some(), "{law}: {error}");
     }
-    for law in ["orca", "cbf-qp", "flocking"] {
+    for law in ["orca", "bvc", "cbf-qp", "flocking"] {
         for known in ["", "known_by = \"all\"\n", "known_by = [1, 2, 3]\n[deadlock]\nmode = \"auto\"\n"] {
             assert!(read(&format!("{rest}{known}"), "", law).is_ok(), "{law} {known}");
         }

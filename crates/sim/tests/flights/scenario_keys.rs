@@ -56,6 +56,27 @@ fn a_wrong_key_is_refused_at_its_place() {
     }
 }
 
+/// Keys of `cbf-qp` that its variant does not use, or with which it cannot brake, are refused at their place.
+#[test]
+fn keys_that_a_variant_of_cbf_qp_cannot_use_are_refused() {
+    let mission = MISSION.replace("mode = \"start\"\nhold_s = 3\n", "");
+    let with = |keys: &str| mission.replace("kind = \"displacement\"", &format!("kind = \"cbf-qp\"\n{keys}"));
+    read(&with("variant = \"braking\"\nmargin_m = 0.1\napproach_per_s = 3")).expect("a valid scenario");
+    for (keys, message) in [
+        ("margin_m = 0.1", "margin_m is 0.1, and only the braking variant uses it"),
+        ("approach_per_s = 3", "approach_per_s is 3,"),
+    ] {
+        let error = refusal(&with(keys));
+        assert_eq!(error.code(), "law/parameter", "{error}");
+        assert!(error.message.contains(message) && error.help.contains("set law.variant"), "{error}");
+        assert_eq!(error.place.as_ref().map(|place| place.line), Some(10), "{error}");
+    }
+    let fast = with("variant = \"braking\"\nmax_speed_m_s = 9").replace("[start]", "[swarm]\na22_per_s = 0.6\n[start]");
+    let error = refusal(&fast);
+    assert!(error.code() == "law/parameter" && error.message.contains("max_speed_m_s is 9"), "{error}");
+    assert!(error.help.contains("lower law.max_speed_m_s") && error.place.is_some(), "{error}");
+}
+
 #[test]
 fn slots_must_not_be_spread_to_the_end_of_the_flight() {
     let held = refusal(&MISSION.replace("hold_s = 3", "hold_s = 60"));

@@ -10,7 +10,7 @@ use tautline_sim::vehicle::MODELS;
 use super::model;
 
 /// Laws with keys that press vehicles against their limits: default gains, and gains that make commands switch.
-const LAWS: [(&str, &[&str]); 9] = [
+const LAWS: [(&str, &[&str]); 11] = [
     ("edge-tension", &[]),
     ("displacement", &["law.k_per_s2=0.6"]),
     ("displacement", &["law.k_per_s2=6", "law.zeta_per_s=0.4"]),
@@ -18,7 +18,9 @@ const LAWS: [(&str, &[&str]); 9] = [
     ("laplacian", &["law.f1_per_s2=8", "law.f2_per_s=0.5"]),
     ("potential", &[]),
     ("orca", &[]),
+    ("bvc", &[]),
     ("cbf-qp", &[]),
+    ("cbf-qp", &["law.variant=braking"]),
     ("flocking", &[]),
 ];
 
