@@ -122,7 +122,7 @@ pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;
 pub use saved::SavedShield;
 pub use settings::{Limits, Settings, ShieldError, ShieldFault};
-pub use shield::Shield;
+pub use shield::{Shield, Timing};
 pub use start::Start;
 pub use unicycle::UnicycleShield;
 

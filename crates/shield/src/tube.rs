@@ -49,7 +49,12 @@
 //!
 //! The numbers of this bound are rounded too: the terms above are doubled.
 
+mod irregular;
+
 use nalgebra::{DMatrix, DVector, Dim, Matrix, RawStorage, RowDVector, SMatrix};
+
+pub use irregular::Intervals;
+pub(crate) use irregular::{LARGEST_DRAG, integrals};
 
 /// Smallest number of cells of a period.
 const CELLS: usize = 16;
@@ -132,6 +137,8 @@ pub enum TubeError {
     LongPeriod,
     /// The drag is too large for the enclosure with this period.
     LargeDrag,
+    /// The enclosure with irregular instants covers no lag.
+    IrregularLag,
 }
 
 /// Largest product of the norm of the continuous dynamics and the period.
