@@ -249,7 +249,7 @@ pub(crate) fn assumptions(limits: &Limits, counters: &Counters, starts: SharedSt
             false,
         ),
         Assumption::observed(FactKind::TrackingError, (limits.tube().error_m, "m"), counters.tracking_share, is_off),
-        Assumption::timed(FactKind::Period, (settings.period_s, "s"), counters.period_share),
+        Assumption::timed(FactKind::Period, (limits.times_s()[1], "s"), counters.period_share),
         if settings.measurement_age_s > 0.0 {
             Assumption::timed(FactKind::Age, (settings.measurement_age_s, "s"), counters.age_share)
         } else {

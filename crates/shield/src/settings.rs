@@ -69,7 +69,7 @@ const EASE_SHARE: f64 = 0.2;
 pub(crate) const LEAD_PERIODS: f64 = 2.0;
 /// Largest age of a measurement, in periods.
 const MAX_DELAY: usize = 20;
-/// Logarithm of the quotient of two speeds, of which the smaller one moves no position of a double.
+/// Logarithm of the quotient of two speeds so far apart that the smaller one moves no position of a double.
 const VANISHED: f64 = 50.0;
 /// Largest number of instants in a row that a vehicle may miss.
 const MAX_HANG: usize = 20;
@@ -307,13 +307,13 @@ impl Settings {
             (
                 "hang_periods",
                 self.hang_periods as f64,
-                "lower it, shorten the period or lower the gains",
+                "lower it, the gains or the period",
                 Self { hang_periods: 0, ..*self },
             ),
             (
                 "period_tolerance",
                 self.period_tolerance,
-                "lower it, shorten the period or lower the gains",
+                "lower it, the gains or the period",
                 Self { period_tolerance: 0.0, ..*self },
             ),
             (
@@ -945,6 +945,19 @@ mod tests {
             "{}",
             hangs.certificate()
         );
+        for (r, k, age, unknown) in [
+            (0.0, 0, 0.0, 0.0), (0.1, 0, 0.0, 0.0), (0.0, 3, 0.0, 0.0), (0.1, 3, 0.0, 0.0), (0.3, 5, 0.0, 0.0), (0.0, 0, 0.05, 0.0), (0.0, 0, 0.1, 0.0),
+            (0.0, 0, 0.2, 0.0), (0.1, 0, 0.0, 0.005), (0.1, 0, 0.0, 1e-4), (0.1, 3, 0.1, 1e-4), (0.01, 0, 0.0, 0.0005),
+        ] {
+            let limits = Settings { period_tolerance: r, hang_periods: k, measurement_age_s: age, elapsed_error_s: unknown, ..base }.limits();
+            match limits {
+                Ok(limits) => println!("FIG {r} {k} {age} {unknown}: {:?} stop {}", limits.tube(), limits.brake().distance_m(2.0)),
+                Err(error) => println!("FIG {error}"),
+            }
+        }
+        for n in [1, 2, 4] {
+            println!("FIG n {n} {:?}", Settings { measurement_delay_periods: n, ..base }.limits().map(|l| l.tube()));
+        }
         // A known age is a larger error of measurement.
         let old = Settings { measurement_age_s: 0.1, ..base };
         let errors = [0.03 + 0.05 * 0.1 + 0.3 * 0.005, 0.05 + 0.3 * 0.1];
@@ -962,8 +975,7 @@ mod tests {
         assert_eq!(
             refused(|settings| settings.hang_periods = 20),
             "hang_periods: the tracker does not settle for all times between instants with `tracker_per_s2` 4, \
-             `tracker_per_s` 4, 0.05 s to 1.05 s between instants (20); lower it, shorten the period or lower the \
-             gains"
+             `tracker_per_s` 4, 0.05 s to 1.05 s between instants (20); lower it, the gains or the period"
         );
         let little = |settings: &mut Settings| {
             (settings.hang_periods, settings.position_error_m, settings.accel_m_s2) = (7, 0.2, 3.0);

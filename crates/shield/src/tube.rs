@@ -15,6 +15,8 @@
 //! response is a scalar. By the triangle inequality |e| is at most the sum of the absolute responses times the bounds
 //! of their inputs. These are noise (`kp eps_p + kd eps_v` in f), push, d, and the start error (`eps_p`, `eps_v`).
 //!
+//! Irregular instants have another bound, [`TrackerLoop::irregular_tube`].
+//!
 //! # Enclosure
 //! With n cells of length c = h / n in a period, each bound holds between the grid points too:
 //!
