@@ -92,8 +92,8 @@
 //!
 //! - **Reference.** It holds its acceleration over T and advances by T. Reference and plant hold the same command for
 //!   the same time, so T - h adds nothing to the error of the tracker.
-//! - **Tube.** The loop is a linear system whose step is any of those of the times in \[`h-`, H\]. [`tube`] computes
-//!   a norm of the error that no sequence of times leaves.
+//! - **Tube.** The loop is a linear system whose step is any of those of the times in \[`h-`, H\].
+//!   [`tube::irregular`] computes a norm of the error that no sequence of times leaves.
 //! - **Brake.** Its command never reverses the vehicle within H, and its stop point is an upper bound over all
 //!   sequences of times. Lemma 1 holds with both ([`brake::Brake`]).
 //! - **Acceptance.** The position after H, and the stop points after `h-` and H, are tested. The latter keep the room

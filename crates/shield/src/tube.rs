@@ -15,7 +15,7 @@
 //! response is a scalar. By the triangle inequality |e| is at most the sum of the absolute responses times the bounds
 //! of their inputs. These are noise (`kp eps_p + kd eps_v` in f), push, d, and the start error (`eps_p`, `eps_v`).
 //!
-//! Irregular instants have another bound, [`TrackerLoop::irregular_tube`].
+//! Irregular instants have another bound, which [`irregular`] derives.
 //!
 //! # Enclosure
 //! With n cells of length c = h / n in a period, each bound holds between the grid points too:
@@ -51,7 +51,7 @@
 //!
 //! The numbers of this bound are rounded too: the terms above are doubled.
 
-mod irregular;
+pub mod irregular;
 
 use nalgebra::{DMatrix, DVector, Dim, Matrix, RawStorage, RowDVector, SMatrix};
 

@@ -548,7 +548,8 @@ fn times_and_ages_out_of_their_range_are_counted_and_leave_the_reference_in_its_
         let mut shield = Shield::new(&limits, 0, &[start]).expect("alone");
         let first = Timing { elapsed_s: f64::NAN, age_s: 0.0 };
         shield.filter_timed(start.state, Vector3::zeros(), first);
-        let measured = start.state.after(Vector3::zeros(), elapsed_s.max(0.045).min(0.11));
+        let measured =
+            start.state.after(Vector3::zeros(), if elapsed_s.is_nan() { 0.05 } else { elapsed_s.clamp(0.045, 0.11) });
         shield.brake_timed(measured, Timing { elapsed_s, age_s });
         (shield.reference().position_m.x, shield.counters().exceeded())
     };

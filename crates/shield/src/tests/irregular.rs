@@ -344,7 +344,7 @@ fn flight(seed: u64, known: &[Limits]) -> Flight {
 /// Flies flights of random settings, half of them with a search of times and ages. Returns the least separation, the
 /// largest share of a tube, and the number of flights.
 fn fly(seeds: std::ops::Range<u64>, settings: usize) -> (f64, f64, u64) {
-    let known = limits(&mut Random::new(seeds.start ^ 77), settings);
+    let known = limits(&mut Random::new(seeds.start ^ 0x4D), settings);
     let (mut closest_m, mut largest, mut flights) = (f64::INFINITY, 0.0_f64, 0);
     for seed in seeds {
         let mut flight = flight(seed, &known);
@@ -366,8 +366,7 @@ fn fly(seeds: std::ops::Range<u64>, settings: usize) -> (f64, f64, u64) {
 
 #[test]
 fn irregular_flights_keep_the_safety_distance_and_every_bound() {
-    let (closest_m, largest, flights) = fly(0..if long() { 2_000 } else { 200 }, 40);
-    println!("{flights} flights: {closest_m}, share {largest}");
+    let (closest_m, largest, _) = fly(0..if long() { 2_000 } else { 200 }, 40);
     assert!(closest_m < DELTA_M + 0.01 && largest > 0.6, "{closest_m} {largest}");
 }
 
@@ -375,7 +374,8 @@ fn irregular_flights_keep_the_safety_distance_and_every_bound() {
 #[ignore = "20,000 flights"]
 fn twenty_thousand_irregular_flights_keep_the_safety_distance() {
     let (closest_m, largest, flights) = fly(10_000..20_000, 200);
-    println!("{flights} flights: {closest_m}, share {largest}");
+    assert_eq!(flights, 20_000);
+    assert!(closest_m < DELTA_M + 0.001 && largest > 0.99, "{closest_m} {largest}");
 }
 
 /// Returns the number of flights that violate, and the least separation, with shields whose settings are changed.
@@ -409,7 +409,6 @@ fn compare(truth: &Settings, unaware: &Settings, at_least: usize) {
         flight.limits.iter_mut().for_each(|own| *own = limits);
         flight.known = Known::Nothing;
     });
-    println!("{violations} of 40 violate, least {twin}, aware {least}");
     assert!(violations >= at_least, "{violations} of 40 violate, least {twin}");
 }
 
@@ -439,7 +438,6 @@ fn a_shield_with_the_brake_of_regular_instants_violates() {
         limits.envelope.brake = Brake::new(limits.brake().deceleration_m_s2(), 0.05);
         flight.limits.iter_mut().for_each(|own| *own = limits);
     });
-    println!("{violations} of 40 violate, least {least}");
     assert!(violations >= 5, "{violations} of 40 violate, least {least}");
 }
 
