@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use super::{TrackingBasis, is_whole};
 use crate::link::{Radio, RadioUse, Round, period};
 use crate::scenario::{Scenario, ScenarioError, Space, random, unit};
-use tautline_core::fact::Fact;
+use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
 use tautline_laws::law::LawError;
 use tautline_shield::report::Exceeded;
-use tautline_shield::{Broadcast, Counters, Fleet, Settings, Shield, State, Timing};
+use tautline_shield::{Broadcast, Counters, Fleet, Limits, Settings, Shield, State, Timing};
 
 /// Numbers of a shielded flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +96,7 @@ impl ShieldStage {
         Ok(Some(Self {
             fleet,
             certificate: basis.certificate(&limits),
-            facts: basis.facts(limits.tube().error_m),
+            facts: basis.facts(limits.tube().error_m).into_iter().chain(times(&limits)).collect(),
             period_s: limits.settings().period_s,
             is_plane: scenario.space == Space::Plane,
             radio: Radio::new(scenario, count * (count - 1), RadioUse::Contracts),
@@ -279,6 +279,15 @@ impl ShieldStage {
             lost,
         }
     }
+}
+
+/// Returns the facts on irregular instants and ages of measurements, which the shields observe in flight.
+fn times(limits: &Limits) -> impl Iterator<Item = Fact> {
+    let [shortest_s, longest_s] = limits.times_s();
+    let age_s = limits.settings().measurement_age_s;
+    let observed = |kind, seconds| Fact::number(kind, Source::Observed, seconds, "s");
+    let period = (shortest_s < longest_s).then(|| observed(FactKind::Period, longest_s));
+    period.into_iter().chain((age_s > 0.0).then(|| observed(FactKind::Age, age_s)))
 }
 
 /// Stream of the random numbers of hangs, so that they differ from others of the same seed.

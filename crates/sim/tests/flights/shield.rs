@@ -252,6 +252,7 @@ fn vehicles_that_miss_instants_keep_the_certificate() {
     let share = shield.counters.period_share.expect("observed");
     assert!((share - 4.0 / 4.4).abs() < 1e-6, "{share}");
     assert_eq!(regular.counters.period_share, None);
+    assert_eq!((shield.facts.len(), regular.facts.len()), (2, 1));
     assert!(shield.certificate.contains("commands are held over 0.045 to 0.22 s"), "{}", shield.certificate);
     // The same bits again.
     let (again, _) = fly(&read(&format!("{SWAP}\n{hangs}")));
