@@ -7,7 +7,7 @@ use numpy::{PyArray2, PyReadonlyArray2, ToPyArray as _};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use tautline::fact::Coded as _;
-use tautline::shield::{Fleet, Limits, Message, SavedShield, Settings, Shield as VehicleShield, Start, State};
+use tautline::shield::{Fleet, Limits, Message, SavedShield, Settings, Shield as VehicleShield, Start, State, Timing};
 
 use crate::errors::{internal_error, wrong_input_with_code};
 
@@ -40,11 +40,14 @@ impl Shields {
     }
 }
 
-/// Settings with a safety distance, a period, a delay of measurements, and others by name.
-type Given = (f64, f64, usize, Vec<(String, f64)>);
+/// Settings with a safety distance, a period, a delay of measurements and missed instants, and others by name.
+type Given = (f64, f64, [usize; 2], Vec<(String, f64)>);
 
-fn limits((delta_m, period_s, measurement_delay_periods, others): Given) -> PyResult<Limits> {
-    let mut settings = Settings { measurement_delay_periods, ..Settings::new(delta_m, period_s) };
+/// Time since the last instant and age of the measurement \[s\]. `None` for the period.
+type Times = (Option<f64>, f64);
+
+fn limits((delta_m, period_s, [measurement_delay_periods, hang_periods], others): Given) -> PyResult<Limits> {
+    let mut settings = Settings { measurement_delay_periods, hang_periods, ..Settings::new(delta_m, period_s) };
     others.iter().try_for_each(|(name, value)| set(&mut settings, name, *value))?;
     settings.limits().map_err(refused)
 }
@@ -62,6 +65,11 @@ fn vector(rows: &ArrayView2<'_, f64>, i: usize) -> [f64; 3] {
     [rows[(i, 0)], rows[(i, 1)], rows[(i, 2)]]
 }
 
+/// Returns the times of an instant of a shield.
+fn timing(shield: &VehicleShield, (elapsed_s, age_s): Times) -> Timing {
+    Timing { elapsed_s: elapsed_s.unwrap_or(shield.limits().settings().period_s), age_s }
+}
+
 /// Sets a setting by its name.
 fn set(settings: &mut Settings, name: &str, value: f64) -> PyResult<()> {
     match name {
@@ -74,6 +82,9 @@ fn set(settings: &mut Settings, name: &str, value: f64) -> PyResult<()> {
         "a22_per_s" => settings.a22_per_s = value,
         "tracker_per_s2" => settings.tracker_per_s2 = value,
         "tracker_per_s" => settings.tracker_per_s = value,
+        "period_tolerance" => settings.period_tolerance = value,
+        "elapsed_error_s" => settings.elapsed_error_s = value,
+        "measurement_age_s" => settings.measurement_age_s = value,
         "actuator_lag_s" => settings.actuator_lag_s = value,
         "tracking_error_m" => settings.tracking_error_m = Some(value),
         "path_error_m" => settings.path_error_m = value,
@@ -135,11 +146,16 @@ impl Shield {
         positions_m: PyReadonlyArray2<'_, f64>,
         velocities_m_s: PyReadonlyArray2<'_, f64>,
         wanted_m_s2: PyReadonlyArray2<'_, f64>,
+        times: Option<Times>,
     ) -> Bound<'py, PyArray2<f64>> {
         let (positions, velocities) = (positions_m.as_array(), velocities_m_s.as_array());
         let mut commands = wanted_m_s2.as_array().to_owned();
         for (i, shield) in self.shields.get_mut().iter_mut().enumerate() {
-            let command = shield.filter(state(&positions, &velocities, i), vector(&wanted_m_s2.as_array(), i).into());
+            let (measured, wanted) = (state(&positions, &velocities, i), vector(&wanted_m_s2.as_array(), i).into());
+            let command = match times {
+                None => shield.filter(measured, wanted),
+                Some(times) => shield.filter_timed(measured, wanted, timing(shield, times)),
+            };
             (0..3).for_each(|axis| commands[(i, axis)] = command[axis]);
         }
         commands.to_pyarray(py)
@@ -151,11 +167,16 @@ impl Shield {
         py: Python<'py>,
         positions_m: PyReadonlyArray2<'_, f64>,
         velocities_m_s: PyReadonlyArray2<'_, f64>,
+        times: Option<Times>,
     ) -> Bound<'py, PyArray2<f64>> {
         let (positions, velocities) = (positions_m.as_array(), velocities_m_s.as_array());
         let mut commands = positions.to_owned();
         for (i, shield) in self.shields.get_mut().iter_mut().enumerate() {
-            let command = shield.brake(state(&positions, &velocities, i));
+            let measured = state(&positions, &velocities, i);
+            let command = match times {
+                None => shield.brake(measured),
+                Some(times) => shield.brake_timed(measured, timing(shield, times)),
+            };
             (0..3).for_each(|axis| commands[(i, axis)] = command[axis]);
         }
         commands.to_pyarray(py)

@@ -130,8 +130,8 @@ class Scenario:
     @property
     def obstacles(self) -> int: ...
 
-#: Safety distance [m], period [s], delay of measurements [periods], other settings by name.
-_ShieldSettings = tuple[float, float, int, list[tuple[str, float]]]
+#: Safety distance [m], period [s], delay of measurements and missed instants [periods], other settings by name.
+_ShieldSettings = tuple[float, float, list[int], list[tuple[str, float]]]
 
 @final
 class Shield:
@@ -155,9 +155,13 @@ class Shield:
         positions_m: NDArray[np.float64],
         velocities_m_s: NDArray[np.float64],
         wanted_m_s2: NDArray[np.float64],
+        times: tuple[float | None, float] | None,
     ) -> NDArray[np.float64]: ...
     def brake(
-        self, positions_m: NDArray[np.float64], velocities_m_s: NDArray[np.float64]
+        self,
+        positions_m: NDArray[np.float64],
+        velocities_m_s: NDArray[np.float64],
+        times: tuple[float | None, float] | None,
     ) -> NDArray[np.float64]: ...
     def exchange(self, lost: NDArray[np.bool_] | None) -> None: ...
     def messages(self) -> list[tuple[int, bytes]]: ...

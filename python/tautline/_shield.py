@@ -33,6 +33,10 @@ class ShieldSettings(TypedDict, total=False):
     tracker_per_s2: float
     tracker_per_s: float
     measurement_delay_periods: int
+    period_tolerance: float
+    hang_periods: int
+    elapsed_error_s: float
+    measurement_age_s: float
     actuator_lag_s: float
     tracking_error_m: float | None
     path_error_m: float
@@ -130,6 +134,8 @@ class Shield:
         inbox: Iterable[bytes] = (),
         *,
         lost: ArrayLike | None = None,
+        elapsed_s: float | None = None,
+        age_s: float = 0.0,
     ) -> NDArray[np.float64]:
         """Returns the accelerations to hold over the next period [m/s^2], in the shape of ``wanted``.
 
@@ -137,6 +143,9 @@ class Shield:
         i to j with ``lost[i, j]``. With an ``index`` they are the measured own position, velocity and command (3,) or
         (2,), and ``inbox`` holds the messages that have arrived. Messages that are none are dropped and counted as
         ``invalid_messages``. A command that is not finite makes the vehicle brake.
+
+        ``elapsed_s`` is the time since the last call by the clock of the vehicle, the period unless given. ``age_s`` is
+        the age of the measurement, with the setting ``measurement_age_s``.
 
         Raises :class:`Error` for a wrong shape.
         """
@@ -150,19 +159,27 @@ class Shield:
             raise Error(f"lost: must have the shape ({rows}, {rows}), got {drops.shape}; give a row per sender")
         for message in inbox:
             self._native.hear(_bytes(message))
-        commands = self._native.filter(*given)
+        commands = self._native.filter(*given, _times(elapsed_s, age_s))
         if not own:
             self._native.exchange(drops)
         return self._shaped(commands, wanted)
 
-    def brake(self, positions: ArrayLike, velocities: ArrayLike) -> NDArray[np.float64]:
+    def brake(
+        self,
+        positions: ArrayLike,
+        velocities: ArrayLike,
+        *,
+        elapsed_s: float | None = None,
+        age_s: float = 0.0,
+    ) -> NDArray[np.float64]:
         """Returns the accelerations of the brake for the next period [m/s^2], where there is no command of a law.
 
-        Call it in the place of ``filter`` in a period in which the law gives no command. Messages wait.
+        Call it in the place of ``filter`` in a period in which the law gives no command. Messages wait. ``elapsed_s``
+        and ``age_s`` are those of ``filter``.
         """
         rows = 1 if self.index is not None else self._native.count
         given = self._each(rows, {"positions": positions, "velocities": velocities})
-        return self._shaped(self._native.brake(*given), positions)
+        return self._shaped(self._native.brake(*given, _times(elapsed_s, age_s)), positions)
 
     def messages(self) -> list[tuple[int, bytes]]:
         """Takes the messages to send after ``filter``: receivers, counted from 0, and 64 bytes each.
@@ -248,16 +265,23 @@ def unpickle_shield(*pickled: Any) -> Shield:
 
 def _settings(
     delta_m: float, period_s: float, settings: ShieldSettings
-) -> tuple[float, float, int, list[tuple[str, float]]]:
+) -> tuple[float, float, list[int], list[tuple[str, float]]]:
     """Returns checked settings for the native module."""
     others: dict[str, Any] = dict(settings)
     unknown = next((name for name in others if name not in ShieldSettings.__annotations__), None)
     if unknown is not None:
         names = ", ".join(ShieldSettings.__annotations__)
         raise TypeError(f"{unknown}: is no setting of a shield; give one of {names}")
-    delay = whole_number(others.pop("measurement_delay_periods", 0), "measurement_delay_periods")
+    whole = [whole_number(others.pop(name, 0), name) for name in ("measurement_delay_periods", "hang_periods")]
     given = [(name, number(value, name)) for name, value in others.items() if value is not None]
-    return number(delta_m, "delta_m"), number(period_s, "period_s"), delay, given
+    return number(delta_m, "delta_m"), number(period_s, "period_s"), whole, given
+
+
+def _times(elapsed_s: float | None, age_s: float) -> tuple[float | None, float] | None:
+    """Returns the times of an instant; None for a period and a new measurement."""
+    if elapsed_s is None and age_s == 0.0:
+        return None
+    return None if elapsed_s is None else number(elapsed_s, "elapsed_s"), number(age_s, "age_s")
 
 
 def _bytes(message: object) -> bytes:

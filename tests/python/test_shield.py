@@ -54,6 +54,32 @@ class Alone(Case):
         self.assertIn("certified never closer than 1.000 m", shield.certificate)
         self.assertIn("of 2 vehicles", repr(shield))
 
+    def test_irregular_instants_and_old_measurements_are_covered_and_checked(self) -> None:
+        shield = self.shield(period_tolerance=0.1, hang_periods=2, measurement_age_s=0.1)
+        p, v = np.array([[-3.0, 0.0, 0.0], [3.0, 0.1, 0.0]]), np.zeros((2, 3))
+        elapsed_s, apart = PERIOD_S, []
+        old = [(p, v)] * 2
+        for k in range(120):
+            # The measurement is that of the last instant or a new one.
+            age_s = elapsed_s if k % 2 == 1 and elapsed_s <= 0.1 else 0.0
+            measured = old[-2] if age_s > 0.0 else old[-1]
+            u = shield.filter(*measured, dive(p), elapsed_s=elapsed_s, age_s=age_s)
+            elapsed_s = (0.045, 0.055, 0.1, 0.165)[k % 4]
+            for _ in range(50):
+                dt = elapsed_s / 50
+                p, v = p + v * dt + 0.5 * u * dt**2, v + u * dt
+                apart.append(float(np.linalg.norm(p[1] - p[0])))
+            old.append((p, v))
+        self.assertGreaterEqual(min(apart), 1.0)
+        report = shield.report()
+        self.assertIsNone(report["exceeded"])
+        facts = {fact["fact"]: fact for fact in report["assumptions"]}
+        self.assertEqual([facts[kind]["held"] for kind in ("period", "age")], [True, True])
+        shield.brake(p, v, elapsed_s=0.4)
+        self.assertEqual(shield.report()["exceeded_code"], "period")
+        with self.assertRaisesRegex(tl.Error, "hang_periods: "):
+            self.shield(hang_periods=20)
+
     def test_a_shield_of_one_vehicle_speaks_in_bytes(self) -> None:
         starts = np.array([[-3.0, 0.0, 0.0], [3.0, 0.1, 0.0]])
         announced = [tl.Shield.start(p, delta_m=1.0, period_s=PERIOD_S) for p in starts]

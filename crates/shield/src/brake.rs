@@ -68,21 +68,84 @@ impl State {
 /// After a period of any command u the path of that period is a quadratic Bezier curve with the control points p, p + v
 /// h / 2 and p+. The second point lies in the segment from p to s because G >= h/2. A half-space with p, s, p+ and the
 /// stop point after the period therefore contains the path of the period and the whole brake after it.
+///
+/// # Irregular instants
+/// With [`Brake::irregular`] a command is held over any time T in \[`h-`, H\], which is known only at its end. The
+/// command of the brake is then that of the period H: it never reverses the vehicle. In the last phase, |v| <= b H, it
+/// leaves the speed v (1 - T/H), so the distance of the brake depends on the times. With c = H - `h-` / 2, let
+///
+/// ```text
+/// D(v) = c v  for v <= b c,   D(v) = v^2 / (2 b) + b c^2 / 2  for v >= b c,   G = D / v
+/// ```
+///
+/// D is convex with a continuous slope, and D(v) >= c v for all v. The stop point is s = p + v G(|v|). Claim: for any T
+/// the way w of the time T and the speed v' after it have w + D(v') <= D(v). So the next s is on the segment from p to
+/// s, and the segment after any time of the brake is a part of it: Lemma 1 holds.
+///
+/// - **v > b H.** The way is (v^2 - v'^2) / (2 b), and D(v') <= v'^2 / (2 b) + b c^2 / 2 for each v'.
+/// - **v <= b H.** The way is v T (1 - T / (2 H)), and v' = v (1 - T/H) <= b (H - `h-`) <= b c, so D(v') = c v'. Then
+///   w + D(v') = c v + v T (`h-` - T) / (2 H) <= c v <= D(v).
+///
+/// For another command u the path until T is a part of the curve with the control points p, p + v H / 2 and p+ at the
+/// time H. The second one is in the segment from p to s, because G >= c >= H/2. So p, s and p+ at the time H inside a
+/// half-space put the path inside for every T. The stop point s(T) moves with T. Its second derivative is at most
+/// |u| (1 + |u| / b), so it exceeds the chord from s(`h-`) to s(H) by at most [`Brake::bend_m`]:
+///
+/// ```text
+/// (H - h-)^2 / 8 |u| (1 + |u| / b)
+/// ```
+///
+/// For this, v G(|v|) has the second derivative D'' `u_r`^2 + G' `u_t`^2 along v and 2 G' `u_r` `u_t` across, where
+/// `u_r` and `u_t` are the parts of u. With D'' <= 1/b and G' <= 1/(2 b) its length is at most |u|^2 / b.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brake {
     /// Deceleration \[m/s^2\].
     deceleration_m_s2: f64,
-    /// Period over which a command is held \[s\].
+    /// Longest time over which a command is held \[s\].
     period_s: f64,
     /// Speed that a period of full brake removes \[m/s\].
     removed_m_s: f64,
+    /// Shortest time over which a command is held, and c \[s\]. `None` if each command is held over a period.
+    irregular: Option<Irregular>,
+}
+
+/// Shortest time over which a command is held, and stop distance over the speed at small speeds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Irregular {
+    /// \[s\].
+    shortest_s: f64,
+    /// Constant c \[s\].
+    slow_s: f64,
 }
 
 impl Brake {
     /// Returns the brake of this deceleration \[m/s^2\] and period \[s\], both positive.
     #[must_use]
     pub fn new(deceleration_m_s2: f64, period_s: f64) -> Self {
-        Self { deceleration_m_s2, period_s, removed_m_s: deceleration_m_s2 * period_s }
+        Self { deceleration_m_s2, period_s, removed_m_s: deceleration_m_s2 * period_s, irregular: None }
+    }
+
+    /// Returns the brake of this deceleration \[m/s^2\] where a command is held between a shortest and a longest time
+    /// \[s\], all positive.
+    #[must_use]
+    pub fn irregular(deceleration_m_s2: f64, shortest_s: f64, longest_s: f64) -> Self {
+        let irregular = Irregular { shortest_s, slow_s: longest_s - shortest_s / 2.0 };
+        Self { irregular: (shortest_s < longest_s).then_some(irregular), ..Self::new(deceleration_m_s2, longest_s) }
+    }
+
+    /// Shortest time over which a command is held \[s\].
+    #[must_use]
+    pub fn shortest_s(&self) -> f64 {
+        self.irregular.map_or(self.period_s, |irregular| irregular.shortest_s)
+    }
+
+    /// Returns a bound on the distance of the stop point after a command \[m/s^2\] from the segment between those after
+    /// the shortest and the longest time \[m\].
+    #[must_use]
+    pub fn bend_m(&self, command_m_s2: f64) -> f64 {
+        let Some(Irregular { shortest_s, .. }) = self.irregular else { return 0.0 };
+        let spread_s = self.period_s - shortest_s;
+        spread_s * spread_s / 8.0 * command_m_s2 * (1.0 + command_m_s2 / self.deceleration_m_s2)
     }
 
     /// Deceleration \[m/s^2\].
@@ -95,6 +158,14 @@ impl Brake {
     #[inline]
     #[must_use]
     pub fn glide_s(&self, speed_m_s: f64) -> f64 {
+        if let Some(Irregular { slow_s, .. }) = self.irregular {
+            let slow_m_s = self.deceleration_m_s2 * slow_s;
+            return if speed_m_s <= slow_m_s {
+                slow_s
+            } else {
+                speed_m_s / (2.0 * self.deceleration_m_s2) + slow_m_s * slow_s / (2.0 * speed_m_s)
+            };
+        }
         if speed_m_s < self.removed_m_s {
             return self.period_s / 2.0;
         }
@@ -217,5 +288,48 @@ mod tests {
             assert!(glide >= last - 1e-15 && glide - last < 1e-4, "{k}: {glide} after {last}");
             last = glide;
         }
+    }
+
+    #[test]
+    fn irregular_brakes_stay_in_the_segment_and_irregular_commands_in_its_hull() {
+        let mut random = Random::new(3);
+        for round in 0..300_000 {
+            let (deceleration, shortest) = (random.between(0.2, 8.0), random.between(0.005, 0.1));
+            let longest = shortest * random.between(1.0, if round % 2 == 0 { 1.5 } else { 8.0 });
+            let brake = Brake::irregular(deceleration, shortest, longest);
+            // Many speeds are near the change of the formula.
+            let speed = deceleration * longest * [random.between(0.0, 2.0), random.between(0.0, 12.0)][round % 2];
+            let state = State { position_m: random.vector(10.0), velocity_m_s: random.direction() * speed };
+            let stop = brake.stop_m(&state);
+            let reserved = (stop - state.position_m).norm();
+            let rounding = 1e-12 * (10.0 + reserved);
+            let times = [shortest, longest, random.between(shortest, longest)];
+            let seconds = times[random.index(3)];
+
+            let next = state.after(brake.command(&state.velocity_m_s), seconds);
+            assert!(next.velocity_m_s.dot(&state.velocity_m_s) >= -rounding, "{brake:?} {state:?}");
+            let way = (next.position_m - state.position_m).norm();
+            let left = (brake.stop_m(&next) - next.position_m).norm();
+            assert!(way + left <= reserved + rounding, "{brake:?} {state:?} {seconds}");
+            assert!(brake.glide_s(speed) >= longest / 2.0, "{brake:?} {speed}");
+
+            let command = random.vector(8.0);
+            let normal = random.direction();
+            let extent = |point: &Vector3<f64>| normal.dot(point);
+            let at = |seconds: f64| state.after(command, seconds);
+            let hull = [state.position_m, stop, at(longest).position_m].map(|point| extent(&point));
+            let largest = hull.into_iter().fold(f64::NEG_INFINITY, f64::max);
+            let within = at(longest * random.unit()).position_m;
+            assert!(extent(&within) <= largest + rounding, "{brake:?} {state:?} {command}");
+            let ends = [shortest, longest].map(|seconds| extent(&brake.stop_m(&at(seconds))));
+            let bound = ends[0].max(ends[1]) + brake.bend_m(command.norm());
+            assert!(extent(&brake.stop_m(&at(seconds))) <= bound + rounding, "{brake:?} {state:?} {command}");
+        }
+    }
+
+    #[test]
+    fn a_brake_whose_times_are_equal_is_the_regular_one() {
+        assert_eq!(Brake::irregular(3.0, 0.05, 0.05), Brake::new(3.0, 0.05));
+        assert_eq!(Brake::new(3.0, 0.05).bend_m(5.0), 0.0);
     }
 }

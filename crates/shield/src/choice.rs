@@ -52,9 +52,9 @@ pub(crate) struct Envelope {
     pub(crate) accel_m_s2: f64,
     /// Largest speed V \[m/s\].
     pub(crate) speed_m_s: f64,
-    /// Period h \[s\].
+    /// Longest time between two instants; the period h if all are equal \[s\].
     pub(crate) period_s: f64,
-    /// Brake.
+    /// Brake, with the shortest time between two instants.
     pub(crate) brake: Brake,
 }
 
@@ -95,7 +95,8 @@ impl Envelope {
     pub(crate) fn reach_at_m(&self, speed_m_s: f64, choice: Choice) -> f64 {
         let fastest = speed_m_s + self.accel_m_s2 * self.period_s;
         let ease = if let Choice::GiveWay { ease_m, .. } = choice { ease_m / 2.0 } else { 0.0 };
-        fastest * (self.period_s + self.brake.glide_s(fastest)) + ease + SLACK_M
+        let bend = self.brake.bend_m(self.accel_m_s2 * (1.0 + ROUNDING));
+        fastest * (self.period_s + self.brake.glide_s(fastest)) + ease + bend + SLACK_M
     }
 }
 
@@ -150,7 +151,8 @@ impl Reach {
     }
 
     /// Whether the reference may take this command: it is within the limits, and the position after the period and its
-    /// stop point are inside all planes.
+    /// stop point are inside all planes. With irregular instants these are the position after the longest time and all
+    /// stop points, see [`Brake`].
     pub(crate) fn accepts(&self, envelope: &Envelope, state: &State, command: Vector3<f64>) -> bool {
         let next = state.after(command, envelope.period_s);
         let within = |value: f64, limit: f64| value <= limit * limit * (1.0 + ROUNDING);
@@ -160,7 +162,16 @@ impl Reach {
             return false;
         }
         let stop = envelope.brake.stop_m(&next);
-        self.planes.iter().all(|plane| plane.room_m(&next.position_m) >= 0.0 && plane.room_m(&stop) >= 0.0)
+        let (shortest_s, bend) = (envelope.brake.shortest_s(), envelope.brake.bend_m(command.norm()));
+        let is_inside = |plane: &Plane| plane.room_m(&next.position_m) >= 0.0 && plane.room_m(&stop) >= bend;
+        if !self.planes.iter().all(is_inside) {
+            return false;
+        }
+        if shortest_s == envelope.period_s {
+            return true;
+        }
+        let early_stop = envelope.brake.stop_m(&state.after(command, shortest_s));
+        self.planes.iter().all(|plane| plane.room_m(&early_stop) >= bend)
     }
 
     /// Returns the command for a wish that [`Envelope::cut`] returned.

@@ -30,8 +30,9 @@
 //!
 //! - **A1** Every u with |u| <= A is carried out. |w(t)| <= W at all times. The reference is at most V fast.
 //! - **A2** The own state is measured at the own instants within `eps_p` and `eps_v`. At the start the state is within
-//!   the same of the announced one.
-//! - **A3** The shield runs at every instant. Where it is missed, the brake goes on ([`Shield::brake`]).
+//!   the same of the announced one. A measurement may be older, by a whole number of periods or by a known age.
+//! - **A3** The shield runs at every instant. Where the law has no command, it brakes ([`Shield::brake`]). The time
+//!   between two instants is h, or any time of a range that is known afterwards ([`Shield::filter_timed`]).
 //! - **A4** A message that arrives is what was sent, and arrives after it was sent. It may be late, lost, doubled or
 //!   overtaken.
 //! - **A5** All vehicles use one frame. The starts of a pair are announced values that both vehicles hold with the same
@@ -84,14 +85,39 @@
 //!  side by m1 and the other one by m2. They are at least m1 + m2 = delta + e1 + e2 apart. Each vehicle is within its e
 //!  of its reference. Lemma 4 gives the clearance of obstacles.
 //!
+//! # Irregular instants and old measurements
+//! Let the time T between two instants be any one in \[`h-`, H\] with `h-` = h (1 - r) and H = (k + 1) h (1 + r). Here
+//! r is the tolerance of the period, and k the number of instants in a row that a computer may miss. The actuator
+//! holds its command until the next instant, so a hang is one long T. The vehicle knows T at the next instant.
+//!
+//! - **Reference.** It holds its acceleration over T and advances by T. Reference and plant hold the same command for
+//!   the same time, so T - h adds nothing to the error of the tracker.
+//! - **Tube.** The loop is a linear system whose step is any of those of the times in \[`h-`, H\].
+//!   [`tube::irregular`] computes a norm of the error that no sequence of times leaves.
+//! - **Brake.** Its command never reverses the vehicle within H, and its stop point is an upper bound over all
+//!   sequences of times. Lemma 1 holds with both ([`brake::Brake`]).
+//! - **Acceptance.** The position after H, and the stop points after `h-` and H, are tested. The latter keep the room
+//!   of [`Brake::bend_m`](brake::Brake::bend_m). So p and s are inside all planes for every T, and Lemma 2 holds.
+//!   Lemmas 3 and 4 use no time.
+//! - **Error of the clock.** If T is known within `eps_t`, the reference jumps by at most V `eps_t` and A `eps_t` at
+//!   the next instant. Both ends of the jump are inside the planes. The tube contains these jumps. A vehicle that does
+//!   not measure T takes h for it, with `eps_t` = r h.
+//! - **Age.** A measurement is any time in \[0, a\] old, and the vehicle knows this age. It predicts its state at the
+//!   instant with its own commands since then. By A1 only the push is unknown. Up to drag and `eps_t`, the prediction
+//!   is a measurement of the instant with the errors `eps_p` + a `eps_v` + W a^2 / 2 and `eps_v` + W a. A2 holds with
+//!   them. Before the first measurement the announced start takes its place.
+//!
+//! With r = 0, k = 0 and a = 0 each command has the same bits as without these settings. The vehicles of a pair may
+//! differ in all of them: only margins and segments are announced. [`UnicycleShield`] assumes regular instants.
+//!
 //! The margins of a pair contain 1e-6 m for the rounding of doubles. [`settings`] lists the covered operations, and
 //! refuses settings and starts beyond it.
 //!
 //! # What voids the certificate
-//! A vehicle that is dead, frozen or weaker than A voids it. So do a push or an error beyond its bound, and other
-//! starts on the two sides of a pair. So do forged messages and a vehicle without a contract. A silent vehicle does not
-//! void it: the others stay behind the last common plane. [`Counters::exceeded`](report::Counters::exceeded) names an
-//! assumption that did not hold in a flight.
+//! A vehicle that is dead, frozen or weaker than A voids it, and so does one that misses more than k instants. So do a
+//! push or an error beyond its bound, and other starts on the two sides of a pair. So do forged messages and a vehicle
+//! without a contract. A silent vehicle does not void it: the others stay behind the last common plane.
+//! [`Counters::exceeded`](report::Counters::exceeded) names an assumption that did not hold in a flight.
 //!
 //! Arrival is not proved. Planes that are not renewed stay safe, and vehicles wait behind them.
 
@@ -122,7 +148,7 @@ pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;
 pub use saved::SavedShield;
 pub use settings::{Limits, Settings, ShieldError, ShieldFault};
-pub use shield::Shield;
+pub use shield::{Shield, Timing};
 pub use start::Start;
 pub use unicycle::UnicycleShield;
 

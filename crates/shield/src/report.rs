@@ -15,6 +15,9 @@ const CHANGED_M_S2: f64 = 1e-9;
 /// Excess of a bound that is rounding, in the unit of the bound. It is half of the margin of a vehicle for rounding.
 const ROUNDING: f64 = 2.5e-7;
 
+/// Relative excess of a time that is rounding, as a factor.
+const TIME_ROUNDING: f64 = 1.0 + 1e-9;
+
 /// Counters of one vehicle, or of several after [`Counters::merge`]. A share that was never observed is `None`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Counters {
@@ -56,6 +59,13 @@ pub struct Counters {
     pub coordinate_share: Option<f64>,
     /// Largest distance from the true position to the reference, over the tube.
     pub tracking_share: Option<f64>,
+    /// Largest time between two instants over the longest one, or the shortest one over the smallest. Only the timed
+    /// calls observe it.
+    #[serde(default)]
+    pub period_share: Option<f64>,
+    /// Largest age of a measurement over its bound. Only the timed calls observe it.
+    #[serde(default)]
+    pub age_share: Option<f64>,
     /// Largest error of a measured position over its bound.
     pub position_share: Option<f64>,
     /// Largest error of a measured velocity over its bound.
@@ -81,6 +91,10 @@ pub enum Exceeded {
     Offset(f64),
     /// A command was larger than the vehicle carries out, by this factor.
     Command(f64),
+    /// A time between two instants was out of its range, by this factor.
+    Period(f64),
+    /// A measurement was older than its bound, by this factor.
+    Age(f64),
     /// The reference was farther from the origin than the margin for rounding covers, by this factor.
     Coordinate(f64),
 }
@@ -95,6 +109,8 @@ impl Exceeded {
             | Self::Tube(factor)
             | Self::Offset(factor)
             | Self::Command(factor)
+            | Self::Period(factor)
+            | Self::Age(factor)
             | Self::Coordinate(factor) => factor,
         }
     }
@@ -108,6 +124,8 @@ impl_coded! { Exceeded {
     Self::Tube(_) => "tube",
     Self::Offset(_) => "offset",
     Self::Command(_) => "command",
+    Self::Period(_) => "period",
+    Self::Age(_) => "age",
     Self::Coordinate(_) => "coordinate",
 } }
 
@@ -123,6 +141,8 @@ impl fmt::Display for Exceeded {
             Self::Tube(share) => write!(out, "distance to the reference {share:.3} times the tube"),
             Self::Offset(share) => write!(out, "measured distance to the reference {share:.3} times its bound"),
             Self::Command(share) => write!(out, "command {share:.3} times the largest one"),
+            Self::Period(share) => write!(out, "time between two instants {share:.3} times out of its range"),
+            Self::Age(share) => write!(out, "age of a measurement {share:.3} times its bound"),
             Self::Coordinate(share) => {
                 write!(out, "coordinate {share:.3} times the largest one that the margin for rounding covers")
             }
@@ -169,6 +189,14 @@ impl Assumption {
         let source = if share.is_some() { Source::Observed } else { Source::NotObservable };
         let held = if is_refuted { Some(false) } else { share.map(|share| share <= 1.0) };
         Self { fact: Fact::number(kind, source, value, unit), share, held }
+    }
+
+    /// Assumption about times, which the calls with times observe.
+    pub(crate) fn timed(kind: FactKind, (value, unit): (f64, &'static str), share: Option<f64>) -> Self {
+        match share {
+            Some(_) => Self::observed(kind, (value, unit), share, false),
+            None => Self::declared(kind, value, unit),
+        }
     }
 
     /// Assumption that the starts of each pair are equal on both sides. The value counts the partners that confirmed
@@ -221,8 +249,12 @@ pub(crate) fn assumptions(limits: &Limits, counters: &Counters, starts: SharedSt
             false,
         ),
         Assumption::observed(FactKind::TrackingError, (limits.tube().error_m, "m"), counters.tracking_share, is_off),
-        Assumption::declared(FactKind::Period, settings.period_s, "s"),
-        Assumption::declared(FactKind::Age, settings.measurement_delay_periods as f64, "periods"),
+        Assumption::timed(FactKind::Period, (limits.times_s()[1], "s"), counters.period_share),
+        if settings.measurement_age_s > 0.0 {
+            Assumption::timed(FactKind::Age, (settings.measurement_age_s, "s"), counters.age_share)
+        } else {
+            Assumption::declared(FactKind::Age, settings.measurement_delay_periods as f64, "periods")
+        },
         Assumption::observed(FactKind::Coordinates, (limits.farthest_m(), "m"), counters.coordinate_share, false),
     ]
 }
@@ -241,7 +273,9 @@ impl Counters {
             return Some(Exceeded::MissingMeasurement);
         }
         let shares = [
-            (self.measurement_share(), Exceeded::Measurement as fn(f64) -> Exceeded),
+            (self.period_share, Exceeded::Period as fn(f64) -> Exceeded),
+            (self.age_share, Exceeded::Age),
+            (self.measurement_share(), Exceeded::Measurement),
             (self.tracking_share, Exceeded::Tube),
             (self.offset_share, Exceeded::Offset),
             (self.command_share, Exceeded::Command),
@@ -270,6 +304,8 @@ impl Counters {
             (&mut self.offset_share, other.offset_share),
             (&mut self.command_share, other.command_share),
             (&mut self.coordinate_share, other.coordinate_share),
+            (&mut self.period_share, other.period_share),
+            (&mut self.age_share, other.age_share),
             (&mut self.tracking_share, other.tracking_share),
             (&mut self.position_share, other.position_share),
             (&mut self.velocity_share, other.velocity_share),
@@ -346,6 +382,24 @@ impl Counters {
 
     pub(crate) fn reserved(&mut self, coordinate_m: f64, farthest_m: f64) {
         raise(&mut self.coordinate_share, Some(share(coordinate_m, farthest_m)));
+    }
+
+    /// Records a time between two instants and its range \[s\].
+    pub(crate) fn elapsed(&mut self, elapsed_s: f64, [shortest_s, longest_s]: [f64; 2]) {
+        let late = elapsed_s / (longest_s * TIME_ROUNDING);
+        let early = shortest_s / (elapsed_s * TIME_ROUNDING).max(f64::MIN_POSITIVE);
+        let share = late.max(early);
+        let is_number = elapsed_s.is_finite() && share.is_finite();
+        raise(&mut self.period_share, Some(if is_number { share } else { f64::MAX }));
+    }
+
+    /// Records an age of a measurement and its bound \[s\].
+    pub(crate) fn aged(&mut self, age_s: f64, bound_s: f64) {
+        // Without a bound the age has no effect.
+        if bound_s > 0.0 {
+            let share = if age_s >= 0.0 { age_s / (bound_s * TIME_ROUNDING) } else { f64::MAX };
+            raise(&mut self.age_share, Some(share.min(f64::MAX)));
+        }
     }
 
     pub(crate) fn tracked(&mut self, error_m: f64, bound_m: f64) {

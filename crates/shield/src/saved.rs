@@ -10,7 +10,7 @@ use crate::contracts::SavedContracts;
 use crate::plane::Segment;
 use crate::report::Counters;
 use crate::settings::{Settings, ShieldError, ShieldFault};
-use crate::shield::Shield;
+use crate::shield::{Leg, Shield};
 use crate::start::Start;
 
 /// State of a shield between two instants.
@@ -25,6 +25,10 @@ pub struct SavedShield {
     pub(crate) next: State,
     pub(crate) segment: Segment,
     pub(crate) past: Vec<State>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) legs: Vec<Leg>,
+    #[serde(default)]
+    pub(crate) held: [f64; 3],
     pub(crate) contracts: SavedContracts,
     pub(crate) counters: Counters,
 }
@@ -46,7 +50,10 @@ impl SavedShield {
         starts.iter().try_for_each(Start::check)?;
         let delay = self.settings.measurement_delay_periods;
         let states = [&self.reference, &self.next].into_iter().chain(&self.past);
-        let is_finite = states.clone().all(State::is_finite) && self.segment.is_finite();
+        let [_, longest_s] = limits.times_s();
+        let is_leg = |leg: &Leg| leg.command.iter().all(|value| value.is_finite()) && leg.seconds <= longest_s;
+        let has_commands = self.held.iter().all(|value| value.is_finite()) && self.legs.iter().all(is_leg);
+        let is_finite = states.clone().all(State::is_finite) && self.segment.is_finite() && has_commands;
         if !(is_finite && self.acceleration.iter().all(|value| value.is_finite()) && self.past.len() <= delay + 1) {
             let problem = "the saved state has a number that no shield saves".into();
             return Err(ShieldError::new(

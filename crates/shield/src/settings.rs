@@ -42,7 +42,9 @@ use crate::choice::{Choice, Envelope};
 use crate::contract::Side;
 use crate::plane::{Metric, Segment};
 use crate::start::Start;
-use crate::tube::{TrackerLoop, Tube, TubeError, largest_drag_per_s, longest_period_s, shortest_lag_s};
+use crate::tube::{
+    Intervals, LARGEST_DRAG, TrackerLoop, Tube, TubeError, largest_drag_per_s, longest_period_s, shortest_lag_s,
+};
 use tautline_core::text::{at_least, at_most, exact, shortest};
 
 /// Largest coordinate of a start \[m\].
@@ -67,6 +69,12 @@ const EASE_SHARE: f64 = 0.2;
 pub(crate) const LEAD_PERIODS: f64 = 2.0;
 /// Largest age of a measurement, in periods.
 const MAX_DELAY: usize = 20;
+/// Logarithm of the quotient of two speeds so far apart that the smaller one moves no position of a double.
+const VANISHED: f64 = 50.0;
+/// Largest number of instants in a row that a vehicle may miss.
+const MAX_HANG: usize = 20;
+/// Largest tolerance of a period.
+const MAX_TOLERANCE: f64 = 0.5;
 
 /// Settings of one vehicle. [`Settings::new`] fills in the defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -99,6 +107,21 @@ pub struct Settings {
     pub tracker_per_s: f64,
     /// Age of a measurement when it is used, in periods.
     pub measurement_delay_periods: usize,
+    /// Share r of the period by which the time between two instants may differ from it, up to 0.5. The vehicle knows
+    /// this time afterwards, see [`Timing`](crate::Timing).
+    #[serde(default)]
+    pub period_tolerance: f64,
+    /// Number k of instants in a row that the computer may miss. The actuator holds the last command until the next
+    /// instant, up to (k + 1) h (1 + r).
+    #[serde(default)]
+    pub hang_periods: usize,
+    /// Bound on the error of the known time between two instants \[s\].
+    #[serde(default)]
+    pub elapsed_error_s: f64,
+    /// Largest age of a measurement when it is used \[s\], if the vehicle knows the age of each one, see
+    /// [`Timing`](crate::Timing). The shield predicts the state at the instant with its own commands.
+    #[serde(default)]
+    pub measurement_age_s: f64,
     /// Time constant of the actuator \[s\], which is at zero at the start; 0 for none.
     pub actuator_lag_s: f64,
     /// Assumed bound on the distance to the reference \[m\], in the place of the computed one. For vehicles other than
@@ -139,6 +162,10 @@ impl Settings {
             tracker_per_s2: 4.0,
             tracker_per_s: 4.0,
             measurement_delay_periods: 0,
+            period_tolerance: 0.0,
+            hang_periods: 0,
+            elapsed_error_s: 0.0,
+            measurement_age_s: 0.0,
             actuator_lag_s: 0.0,
             tracking_error_m: None,
             path_error_m: 0.0,
@@ -156,19 +183,8 @@ impl Settings {
     /// If a value is out of range, the tracker is unstable, or nothing is left for the reference or its brake.
     pub fn limits(&self) -> Result<Limits, ShieldError> {
         self.check_ranges()?;
-        let tracker = TrackerLoop {
-            period_s: self.period_s,
-            tracker_per_s2: self.tracker_per_s2,
-            tracker_per_s: self.tracker_per_s,
-            position_error_m: self.position_error_m,
-            velocity_error_m_s: self.velocity_error_m_s,
-            disturbance_m_s2: self.disturbance_m_s2 + self.integration_error_m_s2,
-            a22_per_s: self.a22_per_s,
-            accel_m_s2: self.accel_m_s2,
-            measurement_delay_periods: self.measurement_delay_periods,
-            actuator_lag_s: self.actuator_lag_s,
-        };
-        let mut tube = tracker.tube().map_err(|error| self.no_tube(error, &tracker))?;
+        let tracker = self.tracker();
+        let mut tube = self.loop_tube().map_err(|error| self.no_tube(error, &tracker))?;
         tube.error_m = self.tracking_error_m.unwrap_or(tube.error_m) + self.path_error_m;
         let drag = self.a22_per_s.abs() * self.max_speed_m_s;
         let reference = self.accel_m_s2 - tube.feedback_m_s2 - drag;
@@ -184,6 +200,16 @@ impl Settings {
             ));
         }
         if reference <= 0.0 {
+            if let Some((place, value, remedy)) = self.culprit(|settings| {
+                settings.loop_tube().is_ok_and(|tube| settings.accel_m_s2 - tube.feedback_m_s2 - drag > 0.0)
+            }) {
+                let problem = format!(
+                    "feedback then takes up to {:.4} and drag {drag:.4} of `accel_m_s2` {}; nothing is left",
+                    tube.feedback_m_s2,
+                    shortest(self.accel_m_s2)
+                );
+                return Err(ShieldError::new(ShieldFault::NoReserve, place, problem, value, remedy));
+            }
             return Err(ShieldError::new(
                 ShieldFault::NoReserve,
                 "accel_m_s2",
@@ -207,18 +233,116 @@ impl Settings {
         } else {
             Choice::GiveWay { ease_m: self.ease_m.unwrap_or(EASE_SHARE * self.delta_m), turn: self.turn }
         };
+        let [shortest_s, longest_s] = self.times_s();
         let envelope = Envelope {
             accel_m_s2: reference,
             speed_m_s: self.max_speed_m_s,
-            period_s: self.period_s,
-            brake: Brake::new(brake, self.period_s),
+            period_s: longest_s,
+            brake: Brake::irregular(brake, shortest_s, longest_s),
         };
         let metric = self.half_height_m.map_or(Metric::BALL, |half| Metric::ellipsoid(self.delta_m, half));
         let stretch = metric.stretch();
         let margin_m = f64::midpoint(self.delta_m, ROUNDING_M * stretch) + tube.error_m * stretch;
-        let lead_m = LEAD_PERIODS * self.max_speed_m_s * self.period_s;
+        let lead_m = LEAD_PERIODS * self.max_speed_m_s * longest_s;
         let farthest_m = self.farthest_m(&envelope, &tube, margin_m)?;
         Ok(Limits { settings: *self, tube, envelope, choice, side: Side { margin_m, metric }, lead_m, farthest_m })
+    }
+
+    /// Returns the loop of the tracker.
+    fn tracker(&self) -> TrackerLoop {
+        let [position_error_m, velocity_error_m_s] = self.predicted_errors();
+        TrackerLoop {
+            period_s: self.period_s,
+            tracker_per_s2: self.tracker_per_s2,
+            tracker_per_s: self.tracker_per_s,
+            position_error_m,
+            velocity_error_m_s,
+            disturbance_m_s2: self.disturbance_m_s2 + self.integration_error_m_s2,
+            a22_per_s: self.a22_per_s,
+            accel_m_s2: self.accel_m_s2,
+            measurement_delay_periods: self.measurement_delay_periods,
+            actuator_lag_s: self.actuator_lag_s,
+        }
+    }
+
+    /// Returns the computed tube.
+    fn loop_tube(&self) -> Result<Tube, TubeError> {
+        match self.intervals() {
+            None => self.tracker().tube(),
+            Some(intervals) => self.tracker().irregular_tube(&intervals),
+        }
+    }
+
+    /// Returns the shortest and the longest time between two instants \[s\].
+    fn times_s(&self) -> [f64; 2] {
+        // Exact if the instants are regular.
+        let longest_s = (self.hang_periods + 1) as f64 * self.period_s * (1.0 + self.period_tolerance);
+        [self.period_s * (1.0 - self.period_tolerance), longest_s]
+    }
+
+    /// Returns the times between instants if they are irregular.
+    fn intervals(&self) -> Option<Intervals> {
+        let is_irregular = self.period_tolerance > 0.0 || self.hang_periods > 0;
+        let [shortest_s, longest_s] = self.times_s();
+        let jumps = [self.max_speed_m_s, self.accel_m_s2].map(|rate| rate * self.elapsed_error_s);
+        is_irregular.then_some(Intervals { shortest_s, longest_s, jumps })
+    }
+
+    /// Returns the bounds on the errors of position \[m\] and velocity \[m/s\] at an instant, of a state predicted from
+    /// a measurement of the largest known age T. With G = exp(a22 T) or 1, and m instants in that time:
+    ///
+    /// ```text
+    /// velocity   G (eps_v + W T) + A eps_t m (m + 1)
+    /// position   eps_p + G (eps_v T + W T^2/2) + A eps_t m (m + 1) T + 2 path errors
+    /// ```
+    ///
+    /// With times known within `eps_t`, the j-th last change of the command, at most 2 A, is known within j `eps_t`.
+    pub(crate) fn predicted_errors(&self) -> [f64; 2] {
+        let errors = [self.position_error_m, self.velocity_error_m_s];
+        let age_s = self.measurement_age_s;
+        if age_s == 0.0 {
+            return errors;
+        }
+        let push = self.disturbance_m_s2 + self.integration_error_m_s2;
+        let growth = (self.a22_per_s * age_s).exp().max(1.0) * (1.0 + 1e-12);
+        let instants = (age_s / self.times_s()[0]).floor() + 1.0;
+        let switched = self.accel_m_s2 * self.elapsed_error_s * instants * (instants + 1.0);
+        let velocity = growth * (errors[1] + push * age_s) + switched;
+        let moved = growth * (errors[1] * age_s + push * age_s * age_s / 2.0) + switched * age_s;
+        [errors[0] + moved + 2.0 * self.path_error_m, velocity]
+    }
+
+    /// Returns the setting of the instants that is the only reason why a condition fails, with its value and a remedy.
+    fn culprit(&self, holds: impl Fn(Self) -> bool) -> Option<(&'static str, f64, &'static str)> {
+        let candidates = [
+            // Without the other settings it has no effect.
+            (
+                "elapsed_error_s",
+                self.elapsed_error_s,
+                "measure the time between instants more accurately, or lower the gains",
+                Self { elapsed_error_s: 0.0, ..*self },
+            ),
+            (
+                "hang_periods",
+                self.hang_periods as f64,
+                "lower it, the gains or the period",
+                Self { hang_periods: 0, ..*self },
+            ),
+            (
+                "period_tolerance",
+                self.period_tolerance,
+                "lower it, the gains or the period",
+                Self { period_tolerance: 0.0, ..*self },
+            ),
+            (
+                "measurement_age_s",
+                self.measurement_age_s,
+                "use newer measurements or lower both gains of the tracker",
+                Self { measurement_age_s: 0.0, ..*self },
+            ),
+        ];
+        let found = candidates.into_iter().find(|(_, value, _, without)| *value > 0.0 && holds(*without));
+        found.map(|(place, value, remedy, _)| (place, value, remedy))
     }
 
     /// Returns the largest coordinate that the margin for rounding covers \[m\].
@@ -239,7 +363,10 @@ impl Settings {
             let problem = format!("must be at most {STIFF_M} m times `tracker_per_s2`, for the rounding of commands");
             return fails("accel_m_s2", problem, self.accel_m_s2, "lower it or raise `tracker_per_s2`");
         }
-        let periods = (self.max_speed_m_s / (envelope.brake.deceleration_m_s2() * self.period_s)).floor();
+        let [shortest_s, longest_s] = self.times_s();
+        // With irregular instants the speed shrinks in each of the last periods by their smallest ratio.
+        let last = if shortest_s < longest_s { (VANISHED / -(-shortest_s / longest_s).ln_1p()).ceil() } else { 0.0 };
+        let periods = (self.max_speed_m_s / (envelope.brake.deceleration_m_s2() * shortest_s)).floor() + last;
         let jumps = if self.tracking_error_m.is_some() { 0.0 } else { tube.jumps };
         let roundings = 16.0 * (periods + 2.0) + 8.0 * jumps;
         let farthest_m = (MOTION_M / (UNIT_ROUNDOFF * roundings)).floor().min(FARTHEST_M);
@@ -274,6 +401,9 @@ impl Settings {
             ("position_error_m", self.position_error_m),
             ("velocity_error_m_s", self.velocity_error_m_s),
             ("disturbance_m_s2", self.disturbance_m_s2),
+            ("period_tolerance", self.period_tolerance),
+            ("elapsed_error_s", self.elapsed_error_s),
+            ("measurement_age_s", self.measurement_age_s),
             ("actuator_lag_s", self.actuator_lag_s),
             ("tracking_error_m", self.tracking_error_m.unwrap_or(0.0)),
             ("path_error_m", self.path_error_m),
@@ -300,14 +430,68 @@ impl Settings {
             let value = self.measurement_delay_periods as f64;
             return fails("measurement_delay_periods", "must be at most 20 periods", value, "use a longer period");
         }
+        if self.period_tolerance > MAX_TOLERANCE {
+            let (problem, remedy) = ("must be at most 0.5", "use a timer with less jitter, or `hang_periods`");
+            return fails("period_tolerance", problem, self.period_tolerance, remedy);
+        }
+        if self.hang_periods > MAX_HANG {
+            let value = self.hang_periods as f64;
+            return fails("hang_periods", "must be at most 20 periods", value, "use a longer period");
+        }
+        let is_irregular = self.period_tolerance > 0.0 || self.hang_periods > 0;
+        if self.measurement_delay_periods > 0 && (is_irregular || self.measurement_age_s > 0.0) {
+            let problem = "must be 0 with `period_tolerance`, `hang_periods` or `measurement_age_s`";
+            let value = self.measurement_delay_periods as f64;
+            return fails("measurement_delay_periods", problem, value, "give the largest age as `measurement_age_s`");
+        }
+        if self.measurement_age_s > 0.0 && self.actuator_lag_s > 0.0 {
+            let problem = "must be 0 with an actuator lag, which the prediction leaves out";
+            return fails("measurement_age_s", problem, self.measurement_age_s, "use `measurement_delay_periods`");
+        }
+        if self.measurement_age_s > 0.0 && self.a22_per_s.abs() * self.times_s()[1] > LARGEST_DRAG {
+            let problem = "the drag times the longest time between instants must be at most 1 with `measurement_age_s`";
+            return fails("a22_per_s", problem, self.a22_per_s, "lower its magnitude or shorten the period");
+        }
+        if self.elapsed_error_s > 0.0 && !is_irregular {
+            let problem = "must be 0 without `period_tolerance` and `hang_periods`, whose times it is about";
+            return fails("elapsed_error_s", problem, self.elapsed_error_s, "give the tolerance of the period");
+        }
+        if self.measurement_age_s > MAX_DELAY as f64 * self.period_s {
+            let problem = "must be at most 20 periods";
+            return fails("measurement_age_s", problem, self.measurement_age_s, "use newer measurements");
+        }
+        let [shortest_s, _] = self.times_s();
+        if self.elapsed_error_s > shortest_s {
+            let problem = "must be at most the shortest time between two instants";
+            return fails("elapsed_error_s", problem, self.elapsed_error_s, "measure this time, see `Timing`");
+        }
         Ok(())
     }
 
     fn no_tube(&self, error: TubeError, tracker: &TrackerLoop) -> ShieldError {
         let has_lag = self.actuator_lag_s > 0.0;
         let of_period = format!("for a period of {} s", shortest(self.period_s));
+        let [from_s, to_s] = self.times_s().map(|time_s| shortest((time_s * 1e9).round() / 1e9));
+        let of_times = format!("{from_s} s to {to_s} s between instants");
+        let gains = [self.tracker_per_s2, self.tracker_per_s].map(shortest);
+        let of_gains = format!("with `tracker_per_s2` {}, `tracker_per_s` {}, {of_times}", gains[0], gains[1]);
+        if error == TubeError::IrregularLag {
+            let problem = "must be 0 with irregular instants: their tube covers no lag";
+            let remedy = "leave out `period_tolerance` and `hang_periods`, or the lag";
+            let value = self.actuator_lag_s;
+            return ShieldError::new(ShieldFault::Tracker, "actuator_lag_s", problem.into(), value, remedy);
+        }
+        if self.intervals().is_some() && error == TubeError::LargeDrag {
+            let problem = format!("its product with the longest of {of_times} must be at most {LARGEST_DRAG}");
+            let remedy = "lower its magnitude, shorten the period or lower `hang_periods`";
+            return ShieldError::new(ShieldFault::Tracker, "a22_per_s", problem, self.a22_per_s, remedy);
+        }
+        if let Some((place, value, remedy)) = self.culprit(|settings| settings.loop_tube().is_ok()) {
+            let problem = format!("the tracker does not settle {of_gains}");
+            return ShieldError::new(ShieldFault::Tracker, place, problem, value, remedy);
+        }
         let place = match error {
-            TubeError::ShortLag => "actuator_lag_s",
+            TubeError::ShortLag | TubeError::IrregularLag => "actuator_lag_s",
             TubeError::LongPeriod => "period_s",
             TubeError::LargeDrag => "a22_per_s",
             // Name the setting that leaves a tube when it is 0.
@@ -345,7 +529,9 @@ impl Settings {
             shortest(self.actuator_lag_s)
         );
         let problem = match error {
-            TubeError::Unstable => format!("the tracker is unstable {of_loop}"),
+            TubeError::Unstable | TubeError::IrregularLag => {
+                format!("the tracker is unstable {of_loop}")
+            }
             TubeError::Slow => format!("the tracker settles too slowly or not at all {of_loop}"),
             TubeError::ShortLag => {
                 format!("must be 0 or at least {} s {of_period}", at_most(shortest_lag_s(self.period_s), 6))
@@ -393,6 +579,12 @@ impl Limits {
     #[must_use]
     pub fn reference_m_s2(&self) -> f64 {
         self.envelope.accel_m_s2
+    }
+
+    /// Shortest and longest time between two instants \[s\]; both are the period if instants are regular.
+    #[must_use]
+    pub fn times_s(&self) -> [f64; 2] {
+        self.settings.times_s()
     }
 
     /// Brake of the reference.
@@ -474,6 +666,24 @@ impl Limits {
             1 => "; measurements are a period old".to_owned(),
             periods => format!("; measurements are {periods} periods old"),
         };
+        let [shortest_s, longest_s] = self.times_s();
+        let held = if shortest_s < longest_s {
+            // Rounding of the last digits is left out.
+            let [from_s, to_s] = [shortest_s, longest_s].map(|time_s| shortest((time_s * 1e9).round() / 1e9));
+            format!("; commands are held over {from_s} to {to_s} s")
+        } else {
+            String::new()
+        };
+        let elapsed = if settings.elapsed_error_s > 0.0 {
+            format!("; this time is known within {} s", settings.elapsed_error_s)
+        } else {
+            String::new()
+        };
+        let age = if settings.measurement_age_s > 0.0 {
+            format!("; measurements are at most {} s old, with known ages", settings.measurement_age_s)
+        } else {
+            String::new()
+        };
         let lag = if settings.actuator_lag_s > 0.0 {
             format!("; actuators lag by {} s", settings.actuator_lag_s)
         } else {
@@ -490,7 +700,7 @@ impl Limits {
         format!(
             "{certified}never closer than {} m{height} under any law and any loss of messages. Assumed: {tracking}\
              commands up to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} \
-             m/s; pushes stay below {} m/s^2{delay}{lag} ({tube} {} m)",
+             m/s; pushes stay below {} m/s^2{delay}{held}{elapsed}{age}{lag} ({tube} {} m)",
             exact(settings.delta_m),
             settings.accel_m_s2,
             settings.position_error_m,
@@ -724,5 +934,93 @@ mod tests {
             far.starts_with("start: reserves space farther than 1000000 m from the origin along an axis (2000000)")
         );
         assert!(far.ends_with("use a local frame with its origin near the vehicles"), "{far}");
+    }
+
+    #[test]
+    fn irregular_instants_and_old_measurements_change_the_limits() {
+        let base = Settings {
+            position_error_m: 0.03,
+            velocity_error_m_s: 0.05,
+            disturbance_m_s2: 0.3,
+            ..Settings::new(1.0, 0.05)
+        };
+        let tube = |settings: Settings| settings.limits().expect("certified").tube();
+        let regular = tube(base);
+        let jitter = tube(Settings { period_tolerance: 0.1, ..base });
+        assert!((0.155..0.1552).contains(&jitter.error_m), "{jitter:?}");
+        let hangs = Settings { period_tolerance: 0.1, hang_periods: 3, ..base }.limits().expect("certified");
+        assert!((0.155..0.156).contains(&hangs.tube().error_m), "{hangs:?}");
+        assert!((1.18..1.21).contains(&hangs.tube().feedback_m_s2), "{hangs:?}");
+        assert!((hangs.times_s()[0] - 0.045).abs() < 1e-15 && (hangs.times_s()[1] - 0.22).abs() < 1e-15);
+        assert!(
+            hangs.certificate().contains("0.3 m/s^2; commands are held over 0.045 to 0.22 s (tube"),
+            "{}",
+            hangs.certificate()
+        );
+        // A known age is a larger error of measurement.
+        let old = Settings { measurement_age_s: 0.1, ..base };
+        let errors = [0.03 + 0.05 * 0.1 + 0.3 * 0.005, 0.05 + 0.3 * 0.1];
+        assert!(old.predicted_errors().into_iter().zip(errors).all(|(found, error)| (found - error).abs() < 1e-12));
+        let wider = Settings { position_error_m: errors[0], velocity_error_m_s: errors[1], ..base };
+        assert!((tube(old).error_m - tube(wider).error_m).abs() < 1e-9);
+        assert!(old.limits().expect("certified").certificate().contains("at most 0.1 s old, with known ages"));
+        // An unknown period costs what the reference may jump.
+        let unknown = tube(Settings { period_tolerance: 0.1, elapsed_error_s: 0.005, ..base });
+        assert!(unknown.error_m > regular.error_m + 0.1, "{unknown:?}");
+    }
+
+    #[test]
+    fn errors_of_irregular_instants_name_their_setting() {
+        assert_eq!(
+            refused(|settings| settings.hang_periods = 20),
+            "hang_periods: the tracker does not settle with `tracker_per_s2` 4, `tracker_per_s` 4, 0.05 s to 1.05 s \
+             between instants (20); lower it, the gains or the period"
+        );
+        let little = |settings: &mut Settings| {
+            (settings.hang_periods, settings.position_error_m, settings.accel_m_s2) = (7, 0.2, 3.0);
+        };
+        let reserve = refused(little);
+        assert!(reserve.starts_with("hang_periods: feedback then takes up to "), "{reserve}");
+        assert!(reserve.contains("of `accel_m_s2` 3; nothing is left (7); lower it"), "{reserve}");
+        let old = refused(|settings| {
+            (settings.measurement_age_s, settings.disturbance_m_s2, settings.accel_m_s2) = (0.9, 1.0, 2.5);
+        });
+        assert!(old.starts_with("measurement_age_s: feedback then takes up to "), "{old}");
+        assert!(
+            refused(|settings| settings.period_tolerance = 0.6).starts_with("period_tolerance: must be at most 0.5")
+        );
+        assert!(refused(|settings| settings.period_tolerance = f64::NAN).starts_with("period_tolerance: must not be"));
+        assert!(refused(|settings| settings.hang_periods = 21).starts_with("hang_periods: must be at most 20 periods"));
+        assert!(refused(|settings| settings.measurement_age_s = 2.0).contains("at most 20 periods (2)"));
+        assert!(refused(|settings| settings.elapsed_error_s = 0.01).contains("must be 0 without `period_tolerance`"));
+        let irregular = |change: fn(&mut Settings)| {
+            refused(|settings| {
+                settings.period_tolerance = 0.1;
+                change(settings);
+            })
+        };
+        assert!(irregular(|settings| settings.actuator_lag_s = 0.05).starts_with("actuator_lag_s: must be 0 with"));
+        assert!(irregular(|settings| settings.measurement_delay_periods = 1).contains("as `measurement_age_s`"));
+        assert!(irregular(|settings| settings.elapsed_error_s = 0.1).contains("the shortest time"));
+        assert!(irregular(|settings| settings.elapsed_error_s = 0.04).starts_with("elapsed_error_s: feedback then"));
+        assert!(irregular(|settings| settings.a22_per_s = -30.0).starts_with("a22_per_s: "));
+        let lag = |settings: &mut Settings| (settings.measurement_age_s, settings.actuator_lag_s) = (0.1, 0.05);
+        assert!(refused(lag).starts_with("measurement_age_s: must be 0 with an actuator lag"));
+        assert!(refused(|settings| (settings.measurement_age_s, settings.a22_per_s) = (0.1, -30.0)).starts_with("a22"));
+        // Numbers that no flight has leave an error or limits, and no panic.
+        let sizes = [1e-300, 1e-9, 1.0, 1e9, 1e300];
+        for [gain, rate, size] in [[4, 0, 1], [0, 4, 4], [4, 4, 4], [2, 3, 2]] {
+            let settings = Settings {
+                tracker_per_s2: sizes[gain],
+                tracker_per_s: sizes[rate],
+                disturbance_m_s2: sizes[size],
+                period_tolerance: 0.3,
+                hang_periods: 2,
+                measurement_age_s: 0.1,
+                ..Settings::new(1.0, 0.05)
+            };
+            let found = settings.limits().map(|limits| limits.tube().error_m.is_finite());
+            assert_ne!(found, Ok(false), "{settings:?}");
+        }
     }
 }

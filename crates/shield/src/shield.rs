@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::agenda::Horizon;
 use crate::brake::State;
@@ -13,12 +14,34 @@ use crate::contracts::Contracts;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
 use crate::report::{Assumption, Counters, SharedStarts, assumptions};
-use crate::saved::SavedShield;
+use crate::saved::{SavedShield, vector};
 use crate::settings::{Limits, NORMAL_M, ShieldError, ShieldFault, UNIT_ROUNDOFF};
 use crate::start::Start;
+use crate::tube::integrals;
 
 /// Number of planes within reach for which memory is reserved.
 const REACHED: usize = 128;
+
+/// Times of an instant by the clock of the vehicle, for [`Shield::filter_timed`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timing {
+    /// Time since the last instant \[s\]; without effect at the first one.
+    pub elapsed_s: f64,
+    /// Age of the measurement \[s\]. Without effect unless [`measurement_age_s`] is above 0.
+    ///
+    /// [`measurement_age_s`]: crate::Settings::measurement_age_s
+    pub age_s: f64,
+}
+
+/// Command between two instants.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Leg {
+    /// Command \[m/s^2\].
+    #[serde(with = "vector")]
+    pub(crate) command: Vector3<f64>,
+    /// Time over which it was held \[s\].
+    pub(crate) seconds: f64,
+}
 
 /// Shield of one vehicle.
 ///
@@ -29,6 +52,11 @@ const REACHED: usize = 128;
 /// At each instant of the vehicle call [`Shield::filter`], send the [`Shield::messages`], and hold the command over the
 /// period. Give each message to [`Shield::hear`] when it arrives, at any time, or its bytes to [`Shield::hear_bytes`].
 /// Messages may be late, lost, doubled or out of order.
+///
+/// [`Shield::filter`] takes the period as the time since the last call, and measurements as new, or as old as
+/// [`measurement_delay_periods`]. A vehicle with irregular instants calls [`Shield::filter_timed`].
+///
+/// [`measurement_delay_periods`]: crate::Settings::measurement_delay_periods
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -66,6 +94,11 @@ pub struct Shield {
     segment: Segment,
     /// References at the last instants, oldest first, for measurements of that age.
     past: VecDeque<State>,
+    /// Commands up to this instant, oldest first, for measurements with a known age, and the command since.
+    legs: VecDeque<Leg>,
+    /// Largest number of legs within the largest age.
+    most_legs: usize,
+    held: Vector3<f64>,
     contracts: Contracts,
     /// Rooms of planes that need not be looked at, at the largest speed.
     fastest: Horizon,
@@ -109,6 +142,8 @@ impl Shield {
         (shield.reference, shield.acceleration) = (saved.reference, saved.acceleration);
         (shield.next, shield.segment) = (saved.next, saved.segment);
         shield.past.extend(&saved.past);
+        shield.legs.extend(saved.legs.iter().take(shield.most_legs));
+        shield.held = saved.held.into();
         shield.counters = saved.counters;
         Ok(shield)
     }
@@ -128,6 +163,8 @@ impl Shield {
             next: self.next,
             segment: self.segment,
             past: self.past.iter().copied().collect(),
+            legs: self.legs.iter().copied().collect(),
+            held: if self.most_legs > 0 { self.held.into() } else { [0.0; 3] },
             contracts: self.contracts.save(),
             counters: self.counters,
         })
@@ -138,6 +175,9 @@ impl Shield {
         let contracts = Contracts::new(index, Arc::clone(starts))?;
         // The index is in the list.
         let own = &starts[index];
+        // At most 20 periods of at least half of the period.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let most_legs = (limits.settings().measurement_age_s / limits.times_s()[0]).ceil() as usize;
         Ok(Self {
             limits: *limits,
             period: 0,
@@ -146,6 +186,9 @@ impl Shield {
             next: own.state,
             segment: own.segment,
             past: VecDeque::with_capacity(limits.settings().measurement_delay_periods + 1),
+            legs: VecDeque::with_capacity(most_legs),
+            most_legs,
+            held: Vector3::zeros(),
             contracts,
             fastest: limits.horizon(limits.settings().max_speed_m_s),
             keep_outs: vec![],
@@ -202,7 +245,24 @@ impl Shield {
     ///
     /// [`measurement_delay_periods`]: crate::Settings::measurement_delay_periods
     pub fn filter(&mut self, measured: State, wanted: Vector3<f64>) -> Vector3<f64> {
-        self.advance();
+        self.advance(None);
+        self.choose(measured, 0.0, wanted)
+    }
+
+    /// Returns the command until the next instant \[m/s^2\], like [`Shield::filter`], with the times of this instant.
+    ///
+    /// The time since the last instant is any one of the range that [`period_tolerance`] and [`hang_periods`] give. A
+    /// time or an age out of its range is counted. The reference then moves by the nearest time of the range.
+    ///
+    /// [`period_tolerance`]: crate::Settings::period_tolerance
+    /// [`hang_periods`]: crate::Settings::hang_periods
+    pub fn filter_timed(&mut self, measured: State, wanted: Vector3<f64>, timing: Timing) -> Vector3<f64> {
+        self.advance(Some(timing));
+        self.choose(measured, timing.age_s, wanted)
+    }
+
+    /// Chooses the acceleration of the reference at an instant, and returns the command.
+    fn choose(&mut self, measured: State, age_s: f64, wanted: Vector3<f64>) -> Vector3<f64> {
         let (limits, reference) = (self.limits, self.reference);
         let reach = limits.envelope.reach_m(&reference, limits.choice);
         self.reach.clear();
@@ -233,19 +293,51 @@ impl Shield {
             self.counters.chosen(true, acceleration.norm(), f64::INFINITY);
             Chosen { acceleration, is_brake: true }
         };
-        self.command(measured, chosen.acceleration)
+        self.command(measured, age_s, chosen.acceleration)
     }
 
     /// Returns the command of the brake \[m/s^2\], where an instant passes without a wish. Messages wait.
     pub fn brake(&mut self, measured: State) -> Vector3<f64> {
-        self.advance();
-        let acceleration = self.limits.envelope.brake.command(&self.reference.velocity_m_s);
-        self.counters.chosen(true, 0.0, 0.0);
-        self.command(measured, acceleration)
+        self.advance(None);
+        self.brake_now(measured, 0.0)
     }
 
-    /// Moves the reference to this instant.
-    fn advance(&mut self) {
+    /// Returns the command of the brake \[m/s^2\], like [`Shield::brake`], with the times of this instant.
+    pub fn brake_timed(&mut self, measured: State, timing: Timing) -> Vector3<f64> {
+        self.advance(Some(timing));
+        self.brake_now(measured, timing.age_s)
+    }
+
+    fn brake_now(&mut self, measured: State, age_s: f64) -> Vector3<f64> {
+        let acceleration = self.limits.envelope.brake.command(&self.reference.velocity_m_s);
+        self.counters.chosen(true, 0.0, 0.0);
+        self.command(measured, age_s, acceleration)
+    }
+
+    /// Moves the reference to this instant, by the period or by the given time since the last instant.
+    fn advance(&mut self, timing: Option<Timing>) {
+        let period_s = self.limits.settings().period_s;
+        let mut elapsed_s = period_s;
+        if let Some(timing) = timing {
+            let times_s = self.limits.times_s();
+            if self.period > 0 {
+                self.counters.elapsed(timing.elapsed_s, times_s);
+                // A time that is not a number leaves the period.
+                elapsed_s = if timing.elapsed_s.is_nan() { period_s } else { timing.elapsed_s };
+                elapsed_s = elapsed_s.clamp(times_s[0], times_s[1]);
+            }
+            self.counters.aged(timing.age_s, self.limits.settings().measurement_age_s);
+        }
+        if self.period > 0 && self.most_legs > 0 {
+            if self.legs.len() == self.most_legs {
+                self.legs.pop_front();
+            }
+            self.legs.push_back(Leg { command: self.held, seconds: elapsed_s });
+        }
+        if elapsed_s != period_s {
+            self.next = self.reference.after(self.acceleration, elapsed_s);
+            self.segment = Segment::new(self.next.position_m, self.limits.envelope.brake.stop_m(&self.next));
+        }
         self.reference = self.next;
         let delay = self.limits.settings().measurement_delay_periods;
         if self.past.len() > delay {
@@ -255,21 +347,56 @@ impl Shield {
         self.period += 1;
     }
 
+    /// Returns the state at this instant that follows from a measurement of this age and the commands since. `None` if
+    /// the age is more than its bound.
+    ///
+    /// A measurement from before the start is replaced by the announced start, whose error is that of a measurement.
+    fn predicted(&self, measured: State, age_s: f64) -> Option<State> {
+        let (mut first, mut left_s) = (self.legs.len(), age_s);
+        while left_s > 0.0 && first > 0 {
+            first -= 1;
+            left_s -= self.legs[first].seconds;
+        }
+        let is_before_start = left_s > 0.0;
+        if age_s.is_nan() || is_before_start && self.legs.len() as u64 + 1 != self.period {
+            return None;
+        }
+        let mut state = if is_before_start { self.contracts.own().state } else { measured };
+        // The measurement was taken so long after the begin of the first leg.
+        let mut skipped_s = (-left_s).max(0.0);
+        let a22 = self.limits.settings().a22_per_s;
+        for leg in self.legs.range(first..) {
+            let [decay, once, twice] = integrals(a22, leg.seconds - skipped_s);
+            skipped_s = 0.0;
+            state = State {
+                position_m: state.position_m + state.velocity_m_s * once + leg.command * twice,
+                velocity_m_s: state.velocity_m_s * decay + leg.command * once,
+            };
+        }
+        Some(state)
+    }
+
     /// Takes the acceleration of the reference, and returns the command with drag and feedback.
-    fn command(&mut self, measured: State, acceleration: Vector3<f64>) -> Vector3<f64> {
+    fn command(&mut self, measured: State, age_s: f64, acceleration: Vector3<f64>) -> Vector3<f64> {
         let settings = self.limits.settings();
         self.acceleration = acceleration;
         self.next = self.reference.after(acceleration, settings.period_s);
         self.segment = Segment::new(self.next.position_m, self.limits.envelope.brake.stop_m(&self.next));
         self.counters.reserved(self.segment.farthest_m(), self.farthest_m);
-        let then = self.past.front().filter(|_| self.past.len() > settings.measurement_delay_periods);
+        let [position_error_m, _] = settings.predicted_errors();
+        // The compared states are those of the instant, or both of an earlier one.
+        let (measured, then) = if settings.measurement_age_s > 0.0 {
+            let predicted = self.predicted(measured, age_s);
+            (predicted.unwrap_or(measured), predicted.and(Some(&self.reference)))
+        } else {
+            (measured, self.past.front().filter(|_| self.past.len() > settings.measurement_delay_periods))
+        };
         let feedback = match then {
             // No measurement of that age exists yet.
             None => Vector3::zeros(),
             Some(then) if measured.is_finite() => {
                 let offset = measured.position_m - then.position_m;
-                let bound = self.limits.tube().error_m + settings.position_error_m;
-                self.counters.measured(offset.norm(), bound);
+                self.counters.measured(offset.norm(), self.limits.tube().error_m + position_error_m);
                 -offset * settings.tracker_per_s2 - (measured.velocity_m_s - then.velocity_m_s) * settings.tracker_per_s
             }
             Some(_) => {
@@ -279,6 +406,7 @@ impl Shield {
         };
         let command = acceleration - self.reference.velocity_m_s * settings.a22_per_s + feedback;
         self.counters.commanded(command.norm(), settings.accel_m_s2);
+        self.held = command;
         command
     }
 

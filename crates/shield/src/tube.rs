@@ -15,6 +15,8 @@
 //! response is a scalar. By the triangle inequality |e| is at most the sum of the absolute responses times the bounds
 //! of their inputs. These are noise (`kp eps_p + kd eps_v` in f), push, d, and the start error (`eps_p`, `eps_v`).
 //!
+//! Irregular instants have another bound, which [`irregular`] derives.
+//!
 //! # Enclosure
 //! With n cells of length c = h / n in a period, each bound holds between the grid points too:
 //!
@@ -49,7 +51,12 @@
 //!
 //! The numbers of this bound are rounded too: the terms above are doubled.
 
+pub mod irregular;
+
 use nalgebra::{DMatrix, DVector, Dim, Matrix, RawStorage, RowDVector, SMatrix};
+
+pub use irregular::Intervals;
+pub(crate) use irregular::{LARGEST_DRAG, integrals};
 
 /// Smallest number of cells of a period.
 const CELLS: usize = 16;
@@ -132,6 +139,8 @@ pub enum TubeError {
     LongPeriod,
     /// The drag is too large for the enclosure with this period.
     LargeDrag,
+    /// The enclosure with irregular instants covers no lag.
+    IrregularLag,
 }
 
 /// Largest product of the norm of the continuous dynamics and the period.

@@ -1,12 +1,13 @@
 //! Random flights with all imperfections within their bounds, and flights whose end is known.
 
 use nalgebra::Vector3;
+use tautline_core::fact::FactKind;
 
 use super::Random;
 use super::world::{Flight, Law, Radio, STEPS, World, flat};
 use crate::plane::Segment;
 use crate::report::Exceeded;
-use crate::{Body, Counters, Fleet, Limits, Message, SavedShield, Settings, Shield, ShieldError, Start, State};
+use crate::{Body, Counters, Fleet, Limits, Message, SavedShield, Settings, Shield, ShieldError, Start, State, Timing};
 
 /// Safety distance of the random flights \[m\].
 const DELTA_M: f64 = 1.0;
@@ -508,4 +509,103 @@ fn commands_beyond_the_limits_of_the_vehicle_count_as_changed() {
     assert!((counters.largest_change_m_s2 - 95.0).abs() < 1e-9, "{counters:?}");
     shield.filter(shield.next_reference(), Vector3::x());
     assert_eq!(shield.counters().changed, 4);
+}
+
+#[test]
+fn calls_with_nominal_times_have_the_bits_of_those_without() {
+    let ranges = Ranges { most_vehicles: 6, laws: &[Law::DiveAtNearest], imperfect: false };
+    let flight = random_flight(3, ranges);
+    let mut world = World::new(&flight);
+    (0..100).for_each(|_| world.step(&flight));
+    for shield in world.fleet.shields_mut() {
+        let mut timed = shield.clone();
+        let period_s = shield.limits().settings().period_s;
+        for round in 0..50 {
+            let measured = shield.next_reference();
+            let wanted = Vector3::new(f64::from(round), 1.0, 0.0);
+            let timing = Timing { elapsed_s: period_s, age_s: f64::NAN };
+            assert_eq!(shield.filter(measured, wanted), timed.filter_timed(measured, wanted, timing));
+        }
+        assert_eq!(timed.counters().exceeded(), None);
+        let period = |shield: &Shield| shield.assumptions().into_iter().find(|one| one.fact.kind == FactKind::Period);
+        assert_eq!(period(shield).and_then(|one| one.held), None);
+        assert_eq!(period(&timed).and_then(|one| one.held), Some(true));
+    }
+}
+
+#[test]
+fn times_and_ages_out_of_their_range_are_counted_and_leave_the_reference_in_its_range() {
+    let settings = Settings {
+        period_tolerance: 0.1,
+        hang_periods: 1,
+        measurement_age_s: 0.1,
+        position_error_m: 0.01,
+        ..Settings::new(DELTA_M, 0.05)
+    };
+    let limits = settings.limits().expect("valid");
+    let start = limits.start(State { position_m: Vector3::zeros(), velocity_m_s: Vector3::x() }).expect("valid");
+    let moved = |elapsed_s: f64, age_s: f64| {
+        let mut shield = Shield::new(&limits, 0, &[start]).expect("alone");
+        let first = Timing { elapsed_s: f64::NAN, age_s: 0.0 };
+        shield.filter_timed(start.state, Vector3::zeros(), first);
+        let measured =
+            start.state.after(Vector3::zeros(), if elapsed_s.is_nan() { 0.05 } else { elapsed_s.clamp(0.045, 0.11) });
+        shield.brake_timed(measured, Timing { elapsed_s, age_s });
+        (shield.reference().position_m.x, shield.counters().exceeded())
+    };
+    let (way_m, exceeded) = moved(0.07, 0.0);
+    assert!((way_m - 0.07).abs() < 1e-12 && exceeded.is_none(), "{way_m} {exceeded:?}");
+    let exceeded = moved(0.2, 0.0).1;
+    assert!(matches!(exceeded, Some(Exceeded::Period(share)) if (share - 0.2 / 0.11).abs() < 1e-6), "{exceeded:?}");
+    for (elapsed_s, expected) in [(0.2, 0.11), (0.0, 0.045), (-1.0, 0.045), (f64::NAN, 0.05), (f64::INFINITY, 0.11)] {
+        let (way_m, exceeded) = moved(elapsed_s, 0.0);
+        assert!((way_m - expected).abs() < 1e-9, "{elapsed_s}: {way_m}");
+        assert!(matches!(exceeded, Some(Exceeded::Period(share)) if share > 1.0), "{elapsed_s}: {exceeded:?}");
+    }
+    for age_s in [0.2, -0.01, f64::NAN, f64::INFINITY] {
+        assert!(matches!(moved(0.05, age_s).1, Some(Exceeded::Age(share)) if share > 1.0), "{age_s}");
+    }
+}
+
+#[test]
+fn a_measurement_of_a_known_age_is_predicted_with_the_commands_since() {
+    let settings = Settings {
+        period_tolerance: 0.2,
+        hang_periods: 1,
+        measurement_age_s: 0.2,
+        a22_per_s: -0.2,
+        position_error_m: 1e-9,
+        ..Settings::new(DELTA_M, 0.05)
+    };
+    let limits = settings.limits().expect("valid");
+    let start = limits.start(State { position_m: Vector3::zeros(), velocity_m_s: Vector3::x() }).expect("valid");
+    let mut random = Random::new(17);
+    let mut shield = Shield::new(&limits, 0, &[start]).expect("alone");
+    // True states in steps of 1 ms; the plant is exact, so that the feedback stays small.
+    let mut truth = vec![start.state];
+    let mut elapsed_ms = 0;
+    for _ in 0..200 {
+        let age_ms = random.index(200);
+        let measured = truth[truth.len().saturating_sub(1 + age_ms)];
+        let timing = Timing { elapsed_s: elapsed_ms as f64 * 1e-3, age_s: age_ms as f64 * 1e-3 };
+        let command = shield.filter_timed(measured, random.vector(9.0), timing);
+        let drag = shield.reference().velocity_m_s * -0.2;
+        let feedback = (command + drag - shield.reference_acceleration_m_s2()).norm();
+        // The reference has no drag within an interval: the push of the drag is within its bound in the tube.
+        assert!(feedback <= limits.tube().feedback_m_s2 && feedback < 0.5, "{feedback}");
+        let offset = shield.counters().offset_share.expect("measured");
+        assert!(offset <= 1.0, "{offset}");
+        elapsed_ms = 40 + random.index(81);
+        for _ in 0..elapsed_ms {
+            let last = truth[truth.len() - 1];
+            // The rule of the midpoint.
+            let middle = last.after(command + last.velocity_m_s * -0.2, 5e-4);
+            truth.push(last.after(command + middle.velocity_m_s * -0.2, 1e-3));
+        }
+        // A loaded shield continues with the same bits.
+        let json = serde_json::to_string(&shield.save().expect("no obstacles")).expect("plain data");
+        let saved: SavedShield = serde_json::from_str(&json).expect("own data");
+        shield = saved.load().expect("own data");
+    }
+    assert_eq!(shield.counters().exceeded(), None);
 }

@@ -2,6 +2,7 @@
 
 mod ellipsoids;
 mod flights;
+mod irregular;
 mod long_segments;
 mod obstacles;
 mod reference;

@@ -110,6 +110,21 @@ pub struct ShieldSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0))]
     pub ease_m: Option<f64>,
+    /// Share of the control period by which the time between two instants of a vehicle may differ from it, up to 0.5.
+    /// The flight itself has exact periods.
+    #[serde(skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0, "maximum" = 0.5))]
+    pub period_tolerance: f64,
+    /// Number of instants in a row, up to 20, that the computer of a vehicle may miss. The vehicle holds its last
+    /// command until the next instant.
+    #[serde(skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = 0, "minimum" = 0, "maximum" = 20))]
+    pub hang_periods: usize,
+    /// Share of the instants after which the computer of a vehicle misses 1 to `hang_periods` instants in the flight;
+    /// the number is random (`noise_seed`).
+    #[serde(skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0, "maximum" = 1))]
+    pub hang_share: f64,
     /// Share of the removed part of a command that is added again to the right, from -1 to 1; negative for the left.
     #[schemars(extend("minimum" = -1, "maximum" = 1))]
     pub turn: f64,
@@ -129,6 +144,9 @@ impl Default for ShieldSpec {
             tracker_per_s: None,
             tracking_error_m: None,
             ease_m: None,
+            period_tolerance: 0.0,
+            hang_periods: 0,
+            hang_share: 0.0,
             turn: 1.0,
         }
     }
@@ -172,6 +190,8 @@ impl Scenario {
         let a22_per_s = self.velocity_coefficient_per_s() - drag_per_s;
         let [tracker_per_s2, tracker_per_s] =
             [spec.tracker_per_s2, spec.tracker_per_s].map(|gain| gain.unwrap_or(TRACKER));
+        let is_irregular = spec.period_tolerance > 0.0 || spec.hang_periods > 0;
+        let (measurement_delay_periods, measurement_age_s) = self.measurement_age(control_hz, is_irregular)?;
         let mut settings = Settings {
             accel_m_s2,
             brake_m_s2: spec.brake_m_s2,
@@ -182,7 +202,10 @@ impl Scenario {
             a22_per_s,
             tracker_per_s2,
             tracker_per_s,
-            measurement_delay_periods: self.measurement_delay_periods(control_hz)?,
+            measurement_delay_periods,
+            measurement_age_s,
+            period_tolerance: spec.period_tolerance,
+            hang_periods: spec.hang_periods,
             actuator_lag_s: self.actuation.lag_s,
             tracking_error_m: spec.tracking_error_m,
             ease_m: spec.ease_m,
@@ -210,8 +233,9 @@ impl Scenario {
         Ok(settings)
     }
 
-    /// Returns the age of a measurement of the own state at an instant of command, in periods.
-    fn measurement_delay_periods(&self, control_hz: f64) -> Result<usize, ScenarioError> {
+    /// Returns the age of a measurement of the own state at an instant of command: in periods, or in s if it is no
+    /// whole number of regular periods.
+    fn measurement_age(&self, control_hz: f64, is_irregular: bool) -> Result<(usize, f64), ScenarioError> {
         let (rate_hz, latency_s) = (self.sensing.rate_hz, self.sensing.latency_s);
         let per_period = rate_hz.map_or(1.0, |rate_hz| rate_hz / control_hz);
         let age_s = rate_hz.map_or(latency_s, |rate_hz| (latency_s * rate_hz - SAME).ceil().max(0.0) / rate_hz);
@@ -221,9 +245,13 @@ impl Scenario {
             let problem = "the number of measurements per control period must be whole";
             return Err(refused(&["sensing.rate_hz", "time.control_hz"], problem, per_period, &help));
         }
-        if is_whole(periods) {
+        if is_whole(periods) && !is_irregular {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; more saturates")]
-            return Ok(periods.round() as usize);
+            return Ok((periods.round() as usize, 0.0));
+        }
+        // The shield predicts the motion of a point without a lag.
+        if self.airframe.is_point() && self.actuation.lag_s == 0.0 || is_irregular {
+            return Ok((0, age_s));
         }
         let help = format!("set sensing.rate_hz to {control_hz}, or a latency of whole periods");
         let problem = "the age of measurements must be a whole number of control periods";
@@ -287,6 +315,11 @@ impl Scenario {
                 return Err(refused(&["time.control_hz", "time.dt_s"], problem, steps, help));
             }
         }
+        if spec.hang_share > 0.0 && spec.hang_periods == 0 {
+            let problem = "shield.hang_share needs shield.hang_periods above 0";
+            let help = "set shield.hang_periods to the largest number of missed instants";
+            return Err(refused(&["shield.hang_share", "shield.hang_periods"], problem, spec.hang_share, help));
+        }
         self.check_tracking(spec)?;
         let (noise_m, bias_m) = (self.sensing.position_noise_m, self.sensing.position_bias_m);
         let noises = [
@@ -336,7 +369,9 @@ impl Scenario {
             "a22_per_s" if self.airframe.quadrotor().is_some() => "shield.max_speed_m_s",
             "a22_per_s" => "swarm.a22_per_s",
             "actuator_lag_s" => "actuation.lag_s",
-            "measurement_delay_periods" => "sensing.latency_s",
+            "measurement_delay_periods" | "measurement_age_s" => "sensing.latency_s",
+            "period_tolerance" => "shield.period_tolerance",
+            "hang_periods" => "shield.hang_periods",
             "accel_m_s2" => "shield.accel_m_s2",
             "brake_m_s2" => "shield.brake_m_s2",
             "max_speed_m_s" => "shield.max_speed_m_s",

@@ -3,16 +3,17 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::TrackingBasis;
+use super::{TrackingBasis, is_whole};
 use crate::link::{Radio, RadioUse, Round, period};
-use crate::scenario::{Scenario, ScenarioError, Space};
-use tautline_core::fact::Fact;
+use crate::scenario::{Scenario, ScenarioError, Space, random, unit};
+use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
 use tautline_laws::law::LawError;
 use tautline_shield::report::Exceeded;
-use tautline_shield::{Broadcast, Counters, Fleet, Shield, State};
+use tautline_shield::{Broadcast, Counters, Fleet, Limits, Settings, Shield, State, Timing};
 
 /// Numbers of a shielded flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,8 +65,10 @@ pub(crate) struct ShieldStage {
     rate_hz: Option<f64>,
     /// Next period of the rate of messages.
     next_period: u64,
-    /// Time of the last instant of command \[s\].
-    begun_s: f64,
+    /// Hangs of the computers, and the last instant of each vehicle.
+    hangs: Hangs,
+    /// Age of each measurement \[s\], for shields that predict the state from it.
+    age_s: f64,
     /// True states at the last instants, oldest first, for measurements of that age.
     truths: VecDeque<Swarm>,
     /// Time from which a vehicle no longer flies its reference \[s\].
@@ -93,13 +96,14 @@ impl ShieldStage {
         Ok(Some(Self {
             fleet,
             certificate: basis.certificate(&limits),
-            facts: basis.facts(limits.tube().error_m),
+            facts: basis.facts(limits.tube().error_m).into_iter().chain(times(&limits)).collect(),
             period_s: limits.settings().period_s,
             is_plane: scenario.space == Space::Plane,
             radio: Radio::new(scenario, count * (count - 1), RadioUse::Contracts),
             rate_hz: scenario.network.rate_hz,
             next_period: 0,
-            begun_s: 0.0,
+            hangs: Hangs::new(scenario, limits.settings()),
+            age_s: limits.settings().measurement_age_s,
             truths: VecDeque::new(),
             failed_from_s,
             measured: starts,
@@ -128,8 +132,8 @@ impl ShieldStage {
     /// Replaces the law's commands at an instant \[m/s^2\], N x 3, by those of the shields. `own` is the knowledge of
     /// each vehicle of its own state.
     pub(crate) fn filter(&mut self, time_s: f64, truth: &Swarm, own: &Swarm, command: &mut Rows) {
-        self.begun_s = time_s;
         self.deliver(time_s);
+        self.hangs.begin(time_s);
         for i in 0..command.nrows() {
             self.measured[i] = state(own, i);
             self.wanted[i] = row(command, i);
@@ -141,11 +145,23 @@ impl ShieldStage {
         let sends = self.has_round(time_s);
         let count = command.nrows();
         let mut round = self.radio.round(|| (0..count).map(|_| Broadcast::for_swarm(count)).collect());
-        let Self { fleet, measured, wanted, commands, .. } = self;
+        let Self { fleet, measured, wanted, commands, hangs, age_s, period_s, .. } = self;
         each(fleet.shields_mut(), commands, &mut round.content, |i, shield, command, broadcast| {
-            *command = shield.filter(measured[i], wanted[i]);
-            if sends {
-                shield.write_broadcast(broadcast);
+            match hangs.elapsed[i] {
+                // The vehicle holds its command.
+                None => broadcast.entries.clear(),
+                Some(periods) => {
+                    let timing = Timing { elapsed_s: f64::from(periods) * *period_s, age_s: *age_s };
+                    let is_timed = hangs.longest > 0 || *age_s > 0.0;
+                    *command = if is_timed {
+                        shield.filter_timed(measured[i], wanted[i], timing)
+                    } else {
+                        shield.filter(measured[i], wanted[i])
+                    };
+                    if sends {
+                        shield.write_broadcast(broadcast);
+                    }
+                }
             }
         });
         for (i, shielded) in self.commands.iter().enumerate() {
@@ -160,8 +176,15 @@ impl ShieldStage {
 
     /// Compares the measurements with the true states that they measured.
     fn observe_measurements(&mut self, time_s: f64, truth: &Swarm) {
-        let delay =
-            self.fleet.shields().first().map_or(0, |shield| shield.limits().settings().measurement_delay_periods);
+        let settings = self.fleet.shields().first().map(|shield| *shield.limits().settings());
+        let delay = settings.map_or(0, |settings| settings.measurement_delay_periods);
+        let aged = self.age_s / self.period_s;
+        if !is_whole(aged) {
+            // No instant is that old.
+            return;
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 20 periods")]
+        let delay = delay + aged.round() as usize;
         if self.truths.len() > delay {
             if let Some(mut oldest) = self.truths.pop_front() {
                 oldest.copy_from(truth);
@@ -180,10 +203,9 @@ impl ShieldStage {
 
     /// Compares a true state with the references.
     pub(crate) fn observe(&mut self, time_s: f64, truth: &Swarm) {
-        let since_s = time_s - self.begun_s;
         for (i, shield) in self.fleet.shields_mut().iter_mut().enumerate() {
             if time_s < self.failed_from_s[i] {
-                shield.observe(since_s, &state(truth, i));
+                shield.observe(time_s - self.hangs.last_s[i], &state(truth, i));
             }
         }
     }
@@ -225,6 +247,7 @@ impl ShieldStage {
     /// Changes the seed of later messages.
     pub(crate) fn reseed(&mut self, seed: u64) {
         self.radio.reseed(seed);
+        self.hangs.reseed(seed);
     }
 
     /// Returns the numbers of the flight so far.
@@ -256,6 +279,80 @@ impl ShieldStage {
             lost,
         }
     }
+}
+
+/// Returns the facts on irregular instants and ages of measurements, which the shields observe in flight.
+fn times(limits: &Limits) -> impl Iterator<Item = Fact> {
+    let [shortest_s, longest_s] = limits.times_s();
+    let age_s = limits.settings().measurement_age_s;
+    let observed = |kind, seconds| Fact::number(kind, Source::Observed, seconds, "s");
+    let period = (shortest_s < longest_s).then(|| observed(FactKind::Period, longest_s));
+    period.into_iter().chain((age_s > 0.0).then(|| observed(FactKind::Age, age_s)))
+}
+
+/// Stream of the random numbers of hangs, so that they differ from others of the same seed.
+const HANG_STREAM: u64 = 0x4841_4E47;
+
+/// Computers that miss instants.
+#[derive(Clone)]
+struct Hangs {
+    random: ChaCha8Rng,
+    /// Share of instants after which a vehicle misses some.
+    share: f64,
+    /// Largest number of missed instants in a row.
+    longest: usize,
+    /// Number of instants that each vehicle still misses.
+    left: Vec<u32>,
+    /// Number of instants since the last one that each vehicle did not miss.
+    passed: Vec<u32>,
+    /// Number of periods since the last instant of each vehicle. `None` if it misses the present one.
+    elapsed: Vec<Option<u32>>,
+    /// Last instant of each vehicle \[s\].
+    last_s: Vec<f64>,
+}
+
+impl Hangs {
+    fn new(scenario: &Scenario, settings: &Settings) -> Self {
+        let count = scenario.count();
+        Self {
+            random: stream(scenario.noise_seed),
+            share: scenario.shield.map_or(0.0, |spec| spec.hang_share),
+            longest: settings.hang_periods,
+            left: vec![0; count],
+            passed: vec![0; count],
+            elapsed: vec![None; count],
+            last_s: vec![0.0; count],
+        }
+    }
+
+    /// Changes the seed of later hangs.
+    fn reseed(&mut self, seed: u64) {
+        self.random = stream(seed);
+    }
+
+    /// Begins an instant, and draws the hangs after it.
+    fn begin(&mut self, time_s: f64) {
+        for i in 0..self.left.len() {
+            self.passed[i] += 1;
+            self.elapsed[i] = (self.left[i] == 0).then_some(self.passed[i]);
+            if self.left[i] > 0 {
+                self.left[i] -= 1;
+                continue;
+            }
+            (self.passed[i], self.last_s[i]) = (0, time_s);
+            if self.share > 0.0 && unit(&mut self.random) < self.share {
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 20")]
+                let missed = (unit(&mut self.random) * self.longest as f64) as u32;
+                self.left[i] = 1 + missed;
+            }
+        }
+    }
+}
+
+fn stream(seed: u64) -> ChaCha8Rng {
+    let mut random = random(seed);
+    random.set_stream(HANG_STREAM);
+    random
 }
 
 /// Number of vehicles from which the shields run concurrently. Each works on its own state, so the bits are the same.

@@ -140,6 +140,8 @@ impl Scenario {
             ("vehicle.attitude_hz", quadrotor.attitude_hz, tracking.attitude_hz),
             ("sensing.latency_s", self.sensing.latency_s, 0.0),
             ("actuation.lag_s", self.actuation.lag_s, 0.0),
+            ("shield.period_tolerance", spec.period_tolerance, 0.0),
+            ("shield.hang_periods", spec.hang_periods as f64, 0.0),
         ];
         let at_most = [
             ("shield.accel_m_s2", given(spec.accel_m_s2), tracking.accel_m_s2),

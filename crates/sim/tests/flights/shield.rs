@@ -156,6 +156,9 @@ fn draw(seed: u64, most: usize) -> Option<(Scenario, Box<dyn Law>)> {
         shield.ease_m = Some(0.0);
         shield.turn = 0.0;
     }
+    if seed % 4 == 3 && scenario.actuation.lag_s == 0.0 {
+        (shield.period_tolerance, shield.hang_periods, shield.hang_share) = (0.05, 2, 0.2);
+    }
     scenario.shield = Some(shield);
     let laws = LawSpec::all();
     let law: Box<dyn Law> = match random.index(laws.len() + 3) {
@@ -234,6 +237,48 @@ fn without_the_shield_the_swap_violates_and_with_it_the_certificate_is_kept() {
     assert_eq!((flight.audit.status, flight.certificate.certified_m), (Status::Clear, Some(1.0)));
     assert_eq!(report(&flight).breach, None);
     assert!(report(&flight).counters.changed > 0);
+}
+
+#[test]
+fn vehicles_that_miss_instants_keep_the_certificate() {
+    let (regular, _) = fly(&read(&format!("{SWAP}\n[shield]")));
+    let hangs = "[shield]\nperiod_tolerance = 0.1\nhang_periods = 3\nhang_share = 0.3";
+    let (flight, _) = fly(&read(&format!("{SWAP}\n{hangs}")));
+    assert_eq!((flight.audit.status, flight.certificate.certified_m), (Status::Clear, Some(1.0)));
+    let (shield, regular) = (report(&flight), report(&regular));
+    assert_eq!(shield.breach, None);
+    assert!(shield.counters.commands * 4 < regular.counters.commands * 3, "{shield:?}");
+    // With 1 to 3 missed instants the longest time is 4 periods of at most 4.4.
+    let share = shield.counters.period_share.expect("observed");
+    assert!((share - 4.0 / 4.4).abs() < 1e-6, "{share}");
+    assert_eq!(regular.counters.period_share, None);
+    assert_eq!((shield.facts.len(), regular.facts.len()), (2, 1));
+    assert!(shield.certificate.contains("commands are held over 0.045 to 0.22 s"), "{}", shield.certificate);
+    // The same bits again.
+    let (again, _) = fly(&read(&format!("{SWAP}\n{hangs}")));
+    assert_eq!(report(&again), shield);
+    let error = tautline_sim::scenario::Source::Text {
+        name: "hangs".into(),
+        text: format!("{SWAP}\n[shield]\nhang_share = 0.1"),
+    };
+    let error = Scenario::read(&error, &[]).expect_err("no hangs").to_string();
+    assert!(error.contains("shield.hang_share needs shield.hang_periods above 0 (0.1)"), "{error}");
+}
+
+#[test]
+fn measurements_that_are_no_whole_number_of_periods_old_keep_the_certificate() {
+    for (sensing, keys) in [
+        ("latency_s = 0.03", ""),
+        ("latency_s = 0.05", "hang_periods = 2\nhang_share = 0.2"),
+        ("latency_s = 0.07", "period_tolerance = 0.1\nhang_periods = 1\nhang_share = 0.2"),
+    ] {
+        let (flight, _) = fly(&read(&format!("{SWAP}\n[sensing]\n{sensing}\n[shield]\n{keys}")));
+        let shield = report(&flight);
+        assert_eq!((flight.audit.status, shield.breach), (Status::Clear, None), "{sensing} {keys}");
+        assert_eq!(flight.certificate.certified_m, Some(1.0), "{sensing} {keys}");
+        assert!(shield.counters.age_share.is_some_and(|share| share > 0.999), "{sensing} {keys}");
+        assert!(shield.certificate.contains("s old, with known ages"), "{}", shield.certificate);
+    }
 }
 
 #[test]
