@@ -77,7 +77,7 @@ Inductive entry :=
 Inductive reason :=
   | UnknownVehicle | AfterEnd | WrongPeriod | NotAtInstant | NotReserved | NothingPending | NotHeard | OtherDecision
   | StillPending | PlaneOutside | WrongNumber | NoProposal | DecidedBefore | ContractIsVoid | SegmentOutside
-  | WrongStamp | WrongHash | WrongContent | NeverSent | OtherPlanes.
+  | SentBefore | WrongStamp | WrongHash | WrongContent | NeverSent | OtherPlanes.
 
 Inductive result (A : Type) := Accepted (a : A) | Forbidden (why : reason).
 Arguments Accepted {_}. Arguments Forbidden {_}.
@@ -93,9 +93,9 @@ Notation motion := (contract.motion segment).
 Notation message := (contract.message divider).
 Notation state := (contract.state divider segment).
 
-(** A vehicle within a pair: its period, whether it is between an instant and its command, and whether its planes at the
-    end were compared. *)
-Record clock := { period : nat; looks : bool; ended : bool }.
+(** A vehicle within a pair: its period, whether it is between an instant and its command, whether it has sent a message
+    since, and whether its planes at the end were compared. *)
+Record clock := { period : nat; looks : bool; sends : bool; ended : bool }.
 
 (** State of a pair. [sent] holds the messages sent so far, the newest first, each with the segment of a follower. *)
 Record pair := {
@@ -215,10 +215,11 @@ Definition concerns (e : entry) (p : pair) : bool :=
 Definition begin_instant (c : clock) (k : nat) : result clock :=
   require (negb (ended c)) AfterEnd
     (require (negb (looks c)) NotReserved
-      (require (k =? S (period c)) WrongPeriod (Accepted {| period := k; looks := true; ended := false |}))).
+      (require (k =? S (period c)) WrongPeriod (Accepted {| period := k; looks := true; sends := false; ended := false |}))).
 
-Definition end_instant (c : clock) : clock := {| period := period c; looks := false; ended := false |}.
-Definition end_log (c : clock) : clock := {| period := period c; looks := false; ended := true |}.
+Definition end_instant (c : clock) : clock := {| period := period c; looks := false; sends := false; ended := false |}.
+Definition end_sending (c : clock) : clock := {| period := period c; looks := false; sends := true; ended := false |}.
+Definition end_log (c : clock) : clock := {| period := period c; looks := false; sends := true; ended := true |}.
 
 Definition at_instant {A} (c : clock) (otherwise : result A) : result A :=
   require (negb (ended c)) AfterEnd (require (looks c) NotAtInstant otherwise).
@@ -296,17 +297,22 @@ Definition feed (e : entry) (p : pair) : result pair :=
       let m := message_of stamp hash c in
       if from =? owner_index p then
         after_command (owner_clock p)
-          (require (stamp =? period (owner_clock p)) WrongStamp
-            (require (hash =? o_hash o) WrongHash
-              (require (message_eqb m (owner_message divider stamp o)) WrongContent
-                (Accepted (with_sent p m (segment_of c))))))
+          (require (negb (sends (owner_clock p))) SentBefore
+            (require (stamp =? period (owner_clock p)) WrongStamp
+              (require (hash =? o_hash o) WrongHash
+                (require (message_eqb m (owner_message divider stamp o)) WrongContent
+                  (Accepted (with_sent (with_pair_owner p o (pair_owner_motion p) (end_sending (owner_clock p)))
+                    m (segment_of c)))))))
       else
         after_command (follower_clock p)
-          (require (stamp =? period (follower_clock p)) WrongStamp
-            (require (hash =? f_hash f) WrongHash
-              (require (message_eqb m (follower_message divider stamp f)) WrongContent
-                (require (option_segment_eqb (segment_of c) (Some (next (pair_follower_motion p)))) WrongContent
-                  (Accepted (with_sent p m (segment_of c)))))))
+          (require (negb (sends (follower_clock p))) SentBefore
+            (require (stamp =? period (follower_clock p)) WrongStamp
+              (require (hash =? f_hash f) WrongHash
+                (require (message_eqb m (follower_message divider stamp f)) WrongContent
+                  (require (option_segment_eqb (segment_of c) (Some (next (pair_follower_motion p)))) WrongContent
+                    (Accepted (with_sent
+                      (with_pair_follower p f (pair_follower_motion p) (end_sending (follower_clock p)))
+                      m (segment_of c))))))))
   | Hear to _ stamp hash c =>
       let m := message_of stamp hash c in
       require (existsb (fun old => message_eqb m (fst old) && option_segment_eqb (segment_of c) (snd old)) (sent p))
@@ -367,7 +373,7 @@ Definition pair_at_start (i j : nat) (one other : start) (hash : nat) (d : divid
   match divider_of_starts facts divider segment owner_segment follower_segment between (owner_contains f)
     (follower_contains f) f with
   | Some d =>
-      let c := {| period := 0; looks := false; ended := false |} in
+      let c := {| period := 0; looks := false; sends := false; ended := false |} in
       Some {|
         owner_index := i; follower_index := j; pair_facts := f;
         pair_owner := owned_at_start facts divider starts_hash f d;
@@ -496,12 +502,12 @@ Proof.
     + traces (CommandOwner divider segment s0); [rewrite O, E; reflexivity|]. simpl. rewrite ?O, ?OM. auto.
     + traces (CommandFollower divider segment s0); [rewrite F, E; reflexivity|]. simpl. rewrite ?F, ?FM. auto.
   - destruct (from =? owner_index p); opens H; injection H as <-; split; auto.
-    + apply message_eqb_eq in E1.
+    + apply message_eqb_eq in E2.
       traces (SendOwner divider segment stamp); [reflexivity|]. simpl. repeat (split; auto).
-      intros m g [I | I]; apply in_or_app; [right; left | left; eauto]. injection I as <- _. now rewrite E1, O.
-    + apply message_eqb_eq in E1.
+      intros m g [I | I]; apply in_or_app; [right; left | left; eauto]. injection I as <- _. now rewrite E2, O.
+    + apply message_eqb_eq in E2.
       traces (SendFollower divider segment stamp); [reflexivity|]. simpl. repeat (split; auto).
-      intros m g [I | I]; apply in_or_app; [right; left | left; eauto]. injection I as <- _. now rewrite E1, F.
+      intros m g [I | I]; apply in_or_app; [right; left | left; eauto]. injection I as <- _. now rewrite E2, F.
   - apply require_accepted in H as [Sent H].
     assert (I : In (message_of stamp hash c) (radio s)).
     { apply existsb_exists in Sent. destruct Sent as ([m g] & I & E). apply andb_prop in E. destruct E as [E _].
