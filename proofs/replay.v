@@ -199,7 +199,8 @@ Definition inside_follower (margin : Z) (d : divider) (s : segment) : bool :=
   (b <=? 2 * (extent d (s_begin s) - offset))%Z && (b <=? 2 * (extent d (s_stop s) - offset))%Z.
 
 Definition owner_contains (f : facts) : divider -> segment -> bool := inside_owner (s_margin (owner_start f)).
-Definition follower_contains (f : facts) : divider -> segment -> bool := inside_follower (s_margin (follower_start f)).
+Definition follower_contains (f : facts) : divider -> segment -> bool :=
+  inside_follower (s_margin (follower_start f)).
 
 (** ** Steps of a pair *)
 
@@ -215,7 +216,8 @@ Definition concerns (e : entry) (p : pair) : bool :=
 Definition begin_instant (c : clock) (k : nat) : result clock :=
   require (negb (ended c)) AfterEnd
     (require (negb (looks c)) NotReserved
-      (require (k =? S (period c)) WrongPeriod (Accepted {| period := k; looks := true; sends := false; ended := false |}))).
+      (require (k =? S (period c)) WrongPeriod
+        (Accepted {| period := k; looks := true; sends := false; ended := false |}))).
 
 Definition end_instant (c : clock) : clock := {| period := period c; looks := false; sends := false; ended := false |}.
 Definition end_sending (c : clock) : clock := {| period := period c; looks := false; sends := true; ended := false |}.
@@ -573,7 +575,8 @@ Qed.
 
 Lemma pair_at_start_is_traced : forall i j one other hash d p,
   pair_at_start i j one other hash d = Some p ->
-  is_traced p /\ key p = (i, j, {| owner_start := one; follower_start := other; first_plane := d; starts_hash := hash |}).
+  is_traced p /\
+  key p = (i, j, {| owner_start := one; follower_start := other; first_plane := d; starts_hash := hash |}).
 Proof.
   intros i j a b hash d p H. unfold pair_at_start in H.
   set (f := {| owner_start := a; follower_start := b; first_plane := d; starts_hash := hash |}) in *.
