@@ -53,14 +53,14 @@ class Confirmed(InFolder):
         kinds = [line.split()[0] for line in lines]
         self.assertIn(f"{kinds.count('send')} messages sent, {kinds.count('hear')} received", done.stdout)
         answers = [line.split()[4] for line in lines if line.startswith("decide")]
-        self.assertEqual([answers.count("yes"), answers.count("no")], [shield["accepted"], shield["refused"]])
+        decided = [shield["proposals_accepted"], shield["proposals_refused"]]
+        self.assertEqual([answers.count("yes"), answers.count("no")], decided)
         self.assertEqual(kinds.count("send"), shield["messages_sent"])
         self.assertGreater(kinds.count("take"), 0)
         return kinds
 
     def test_each_shielded_built_in_scenario_is_confirmed(self):
-        listed = json.loads(tautline("list", "--json").stdout)
-        names = [one["name"] for one in listed["scenarios"]]
+        names = [one["name"] for one in json.loads(tautline("list", "--json").stdout)]
         shielded = [name for name in names if "\n[shield]" in tautline("list", "--show", name).stdout]
         self.assertIn("shielded-crazyflies", shielded)
         for name in shielded:
