@@ -3,9 +3,9 @@
 //! The log is text with one event per line, in the order of events. A double is the 16 hexadecimal digits of its bits,
 //! so nothing is rounded. Vehicles are counted from 0. `proofs/README.md` lists the lines.
 //!
-//! The log is written by an observer. It reads the contracts of each vehicle after each instant and compares them with
-//! those that it read before, so a change without an event is noticed: `foreign` names a vehicle that holds another
-//! plane than its events give. A flight without a log does none of this.
+//! The log is written by an observer. After each instant it reads the contracts of a vehicle and compares them with those
+//! that it read before. A line `foreign` names a vehicle that holds another plane than its events give. A flight without
+//! a log does none of this.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
