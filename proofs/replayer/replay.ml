@@ -118,7 +118,15 @@ let reason = function
 
 type totals = { events : int; instants : int; sent : int; heard : int }
 
-type log = { channel : in_channel; size : int; mutable number : int }
+type log = { channel : in_channel; size : int; mutable number : int; mutable check : int; mutable before : int }
+
+(* CRC-32 of IEEE 802.3, bit by bit for each byte value. *)
+let table =
+  let step c = if c land 1 = 1 then 0xEDB88320 lxor (c lsr 1) else c lsr 1 in
+  Array.init 256 (fun byte -> List.fold_left (fun c _ -> step c) byte [1; 2; 3; 4; 5; 6; 7; 8])
+
+let add check byte = table.((check lxor Char.code byte) land 255) lxor (check lsr 8)
+let checked state = Printf.sprintf "%08x" (state lxor 0xFFFFFFFF)
 
 (* The words of the next line. A line without an end of line is a part of one. *)
 let next log =
@@ -126,6 +134,8 @@ let next log =
   | exception End_of_file -> malformed "the log ends before its line \"end\": it is not complete"
   | line ->
       log.number <- log.number + 1;
+      log.before <- log.check;
+      log.check <- add (String.fold_left add log.check line) '\n';
       if pos_in log.channel = log.size && (seek_in log.channel (log.size - 1); input_char log.channel <> '\n') then
         malformed "the line has no end: the log is not complete";
       String.split_on_char ' ' line
@@ -161,13 +171,14 @@ let metres length =
 let rec replay log vertical rows totals words =
   let totals = { totals with events = totals.events + 1 } in
   match words with
-  | ["end"; events; instants; sent; heard] ->
+  | ["end"; events; instants; sent; heard; check] ->
       let counted = [totals.events - 1; totals.instants; totals.sent; totals.heard] in
       let stated = List.map count [events; instants; sent; heard] in
       if not (List.for_all2 (fun a b -> Z.equal (Z.of_int a) b) counted stated) then
         raise (Denied "the log has other numbers of events, instants and messages than its last line states");
       if not (Model.is_complete rows) then raise (Denied "the planes at the end of a vehicle are missing");
       if pos_in log.channel <> log.size then malformed "bytes follow the line \"end\"";
+      if checked log.before <> check then malformed "a line was altered: the CRC-32 of the log differs";
       (rows, { totals with events = totals.events - 1 })
   | _ ->
       let entry = entry words in
@@ -222,7 +233,7 @@ let () =
       match open_in_bin path with
       | exception Sys_error problem -> unreadable problem
       | channel -> (
-          let log = { channel; size = in_channel_length channel; number = 0 } in
+          let log = { channel; size = in_channel_length channel; number = 0; check = 0xFFFFFFFF; before = 0xFFFFFFFF } in
           match check log with
           | () -> ()
           | exception Denied why -> Printf.printf "DENIED: %s, line %d: %s\n" path log.number why; exit 1

@@ -3,9 +3,9 @@
 //! The log is text with one event per line, in the order of events. A double is the 16 hexadecimal digits of its bits,
 //! so nothing is rounded. Vehicles are counted from 0. `proofs/README.md` lists the lines.
 //!
-//! The log is written by an observer. After each instant it reads the contracts of a vehicle and compares them with those
-//! that it read before. A line `foreign` names a vehicle that holds another plane than its events give. A flight without
-//! a log does none of this.
+//! The log is written by an observer. After each instant it reads the contracts of a vehicle and compares them with
+//! those that it read before. A line `foreign` names a vehicle that holds another plane than its events give. A flight
+//! without a log does none of this.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -27,6 +27,8 @@ pub struct ContractLog {
     out: Box<dyn Write + Send>,
     /// Lines that are not written yet.
     text: String,
+    /// CRC-32 of the lines that are written.
+    check: crc32fast::Hasher,
     /// First error of `out`.
     error: Option<io::Error>,
     count: usize,
@@ -72,7 +74,8 @@ impl ContractLog {
     #[must_use]
     pub fn new(out: Box<dyn Write + Send>) -> Self {
         let (text, totals) = (String::with_capacity(2 * BUFFER), LogTotals::default());
-        Self { out, text, error: None, count: 0, known: Vec::new(), totals }
+        let check = crc32fast::Hasher::new();
+        Self { out, text, check, error: None, count: 0, known: Vec::new(), totals }
     }
 
     /// Begins the log with the starts and first planes of a fleet at its start.
@@ -133,7 +136,7 @@ impl ContractLog {
         }
     }
 
-    /// Ends the log with the planes that each vehicle holds, and the numbers of events.
+    /// Ends the log with the planes that each vehicle holds, the numbers of events, and the CRC-32 of all lines before.
     ///
     /// # Errors
     /// The first error of a write.
@@ -151,7 +154,9 @@ impl ContractLog {
             }
         }
         let LogTotals { events, instants, sent, heard } = self.totals;
-        self.line(format_args!("end {events} {instants} {sent} {heard}"));
+        self.write();
+        let check = self.check.clone().finalize();
+        self.line(format_args!("end {events} {instants} {sent} {heard} {check:08x}"));
         self.write();
         if self.error.is_none() {
             self.error = self.out.flush().err();
@@ -208,6 +213,7 @@ impl ContractLog {
     }
 
     fn write(&mut self) {
+        self.check.update(self.text.as_bytes());
         if self.error.is_none() {
             self.error = self.out.write_all(self.text.as_bytes()).err();
         }
@@ -342,7 +348,9 @@ mod tests {
         };
         assert_eq!((totals, totals.instants), (counted, 160));
         let LogTotals { events, instants, sent, heard } = totals;
-        assert_eq!(lines.last().copied(), Some(&*format!("end {events} {instants} {sent} {heard}")));
+        let (before, last) = text.split_at(text.len() - lines[lines.len() - 1].len() - 1);
+        let check = crc32fast::hash(before.as_bytes());
+        assert_eq!(last, format!("end {events} {instants} {sent} {heard} {check:08x}\n"));
         assert!(count("propose 0 1 ") > 2 && count("take 0 1 ") > 2 && count("decide 1 0 ") > 2);
         assert_eq!((count("hold 0 1 "), count("hold 1 0 "), count("foreign")), (1, 1, 0));
     }
