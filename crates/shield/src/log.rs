@@ -337,7 +337,7 @@ mod tests {
         let (text, totals) = fly(|_, _| {});
         let lines: Vec<_> = text.lines().collect();
         assert_eq!(lines[..2], ["tautline contract log 1", "vertical 3ff0000000000000"]);
-        assert!(lines[2].starts_with("start 0 3fe00000") && lines[3].starts_with("start 1 "), "{}", lines[2]);
+        assert!(lines[2].starts_with("start 0 3fe00001") && lines[3].starts_with("start 1 "), "{}", lines[2]);
         assert!(lines[4].starts_with("pair 0 1 ") && lines[5] == "instant 0 1", "{}", lines[4]);
         let count = |word: &str| lines.iter().filter(|line| line.starts_with(word)).count() as u64;
         let counted = LogTotals {
