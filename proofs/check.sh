@@ -2,7 +2,8 @@
 # Checks the proofs. From anywhere: sh proofs/check.sh [--accept]
 #
 # Compiles all files, checks them again with coqchk, and compares the axioms of each theorem with assumptions.txt.
-# --accept writes assumptions.txt. Then copies with a defect must fail. Needs the Debian package coq.
+# --accept writes assumptions.txt. Then copies with a defect must fail. At the end it builds proofs/replay, which checks
+# contract logs. Needs the Debian packages coq, ocaml, ocaml-findlib and libzarith-ocaml-dev.
 set -eu
 cd "$(dirname "$0")"
 scratch=$(mktemp -d)
@@ -42,15 +43,16 @@ if ! diff assumptions.txt "$scratch/proofs/found"; then
     exit 1
 fi
 
-# A copy with a defect must fail: mutant NAME 'COMMANDS OF SED for contract.v'
+# A copy with a defect must fail: mutant NAME FILE 'COMMANDS OF SED'. FILE is contract, or replay, which uses it.
 mutant() {
     mkdir "$scratch/$1"
-    sed "$2" contract.v >"$scratch/$1/contract.v"
-    if cmp -s contract.v "$scratch/$1/contract.v"; then
+    cp contract.v "$scratch/$1"
+    sed "$3" "$2.v" >"$scratch/$1/$2.v"
+    if cmp -s "$2.v" "$scratch/$1/$2.v"; then
         echo "mutant $1: the text to be changed is missing" >&2
         exit 1
     fi
-    grep '^contract\.' assumptions.txt >"$scratch/expected"
+    grep -e '^contract\.' -e "^$2\." assumptions.txt >"$scratch/expected"
     if check "$scratch/$1" >"$scratch/output" 2>&1 &&
         diff "$scratch/expected" "$scratch/$1/found" >"$scratch/output"; then
         echo "mutant $1: not found" >&2
@@ -59,8 +61,21 @@ mutant() {
     echo "mutant $1: found, $(grep -m 1 -e '^>' -e '^File' "$scratch/output")"
 }
 proof='^Proof\. intros facts s R\. eapply invariant_has_common_plane.*'
-mutant admitted "s/$proof/Admitted./"
-mutant axiom "s/$proof/Proof. intros. apply shortcut. Qed./
+mutant admitted contract "s/$proof/Admitted./"
+mutant axiom contract "s/$proof/Proof. intros. apply shortcut. Qed./
     s/^Theorem common_plane /Axiom shortcut : forall s, have_common_plane s.\n&/"
-mutant defect 's/ matches_number := true;/ matches_number := false;/'
+mutant defect contract 's/ matches_number := true;/ matches_number := false;/'
+mutant unchecked replay 's/require (forallb (fun d => owner_contains .*) SegmentOutside/require true SegmentOutside/'
+mutant invented replay 's/require (existsb (fun old => .*/require true/'
+
+# The replay of contract logs, by the functions that Coq extracts from replay.v.
+cp replayer/extract.v replayer/replay.ml "$scratch/proofs"
+(
+    cd "$scratch/proofs"
+    coqc -q -R . Proofs extract.v
+    # Coq writes model.ml, with definitions that are not used.
+    ocamlfind ocamlopt -package zarith -w -a -c model.mli model.ml
+    ocamlfind ocamlopt -package zarith -linkpkg -w +a-4-9-40-41-42-44-45-70 model.cmx replay.ml -o replay
+)
+cp "$scratch/proofs/replay" replay
 echo "proofs: $(wc -l <assumptions.txt) theorems hold, $(grep -c 'no axioms' assumptions.txt) of them without axioms"

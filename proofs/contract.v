@@ -9,6 +9,7 @@
     - Each vehicle takes its steps at any time. The model has no clock.
     - The radio is a list of messages that only grows. Any message of it may arrive at any time, many times, or never.
     - A message may have any stamp. The owner may propose any plane that contains its own segment.
+    - A follower may refuse any plane.
     - A vehicle may or may not look at its contract, propose and send. The conditions on room and due periods are left
       out. *)
 
@@ -197,13 +198,14 @@ Definition propose (o : owned) (segment : Segment) (wish : option Divider) : own
 Definition renew (o : owned) (segment : Segment) (wish : option Divider) : owned :=
   if is_void (o_agreement o) then o else propose (take_decision o) segment wish.
 
-(** `Followed::decide`. *)
-Definition decide (f : followed) (segment : Segment) : followed :=
+(** `Followed::decide`. A follower that is not willing refuses: the model allows to refuse any plane, the code refuses
+    those that do not contain its segment. *)
+Definition decide (f : followed) (segment : Segment) (willing : bool) : followed :=
   match f_proposal f with
   | Some p =>
       if is_void (f_agreement f) || (decides_once r && (p_number p <=? d_number (f_decided f))) then f
       else
-        let accepted := inside_follower (p_divider p) segment in {|
+        let accepted := willing && inside_follower (p_divider p) segment in {|
           f_hash := f_hash f; f_agreement := f_agreement f; f_stamp := f_stamp f; f_proposal := f_proposal f;
           f_held := if accepted then p_divider p else f_held f;
           f_decided := {| d_number := p_number p; d_accepted := accepted |} |}
@@ -240,7 +242,7 @@ Inductive event :=
   (** An instant at which the vehicle looks at its contract: `Shield::advance`, then `Owned::renew` or
       `Followed::decide`. *)
   | RenewOwner (wish : option Divider)
-  | RenewFollower
+  | RenewFollower (willing : bool)
   (** An instant without a look at the contract: `Shield::brake`, or a plane that is not due. *)
   | PassOwner
   | PassFollower
@@ -275,8 +277,8 @@ Definition apply (s : state) (e : event) : option state :=
       (nth_error (radio s) place)
   | RenewOwner wish =>
       let m := advance (owner_motion s) in Some (with_owner s (renew (owner s) (now m) wish) m)
-  | RenewFollower =>
-      let m := advance (follower_motion s) in Some (with_follower s (decide (follower s) (now m)) m)
+  | RenewFollower willing =>
+      let m := advance (follower_motion s) in Some (with_follower s (decide (follower s) (now m) willing) m)
   | PassOwner => Some (with_owner s (owner s) (advance (owner_motion s)))
   | PassFollower => Some (with_follower s (follower s) (advance (follower_motion s)))
   | CommandOwner segment =>
@@ -445,10 +447,10 @@ Proof.
   destruct (is_void (o_agreement o)); [exact H|]. apply propose_holds, take_decision_holds, H.
 Qed.
 
-Lemma decide_holds : forall h o f messages segment,
-  contract_holds h o f messages -> contract_holds h o (decide contract_rules f segment) messages.
+Lemma decide_holds : forall h o f messages segment willing,
+  contract_holds h o f messages -> contract_holds h o (decide contract_rules f segment willing) messages.
 Proof.
-  intros h o f messages segment H. pose proof H as (Ho & Hf & Hp & Hd & Hq & Hm). unfold decide.
+  intros h o f messages segment willing H. pose proof H as (Ho & Hf & Hp & Hd & Hq & Hm). unfold decide.
   destruct (f_proposal f) as [p|] eqn:F; [|exact H].
   destruct (is_void (f_agreement f)); simpl; [exact H|].
   destruct (p_number p <=? d_number (f_decided f)) eqn:L; [exact H|].
@@ -528,14 +530,16 @@ Proof.
   - rewrite <- E. auto.
 Qed.
 
-Lemma decide_keeps_motion : forall f m,
+Lemma decide_keeps_motion : forall f m willing,
   motion_holds inside_follower (follower_planes f) m -> now m = next m ->
-  motion_holds inside_follower (follower_planes (decide contract_rules f (now m))) m.
+  motion_holds inside_follower (follower_planes (decide contract_rules f (now m) willing)) m.
 Proof.
-  intros f m H E. unfold decide. destruct (f_proposal f) as [p|]; auto.
+  intros f m willing H E. unfold decide. destruct (f_proposal f) as [p|]; auto.
   destruct (is_void (f_agreement f) || _); auto. simpl.
-  intros d [<- | []]. destruct (inside_follower (p_divider p) (now m)) eqn:I; simpl.
-  - rewrite <- E. auto.
+  intros d [<- | []]. destruct willing; simpl.
+  - destruct (inside_follower (p_divider p) (now m)) eqn:I.
+    + rewrite <- E. auto.
+    + apply H. now left.
   - apply H. now left.
 Qed.
 

@@ -38,7 +38,8 @@ Definition is_open (s : state) : Prop := o_agreement (owner s) <> Void /\ f_agre
 Definition exchange (s : state) : list event :=
   let stamp := S (o_stamp (owner s) + f_stamp (follower s)) in
   let place := length (radio s) in
-  [SendOwner _ _ stamp; HearFollower _ _ place; RenewFollower _ _; SendFollower _ _ stamp; HearOwner _ _ (S place)].
+  [SendOwner _ _ stamp; HearFollower _ _ place; RenewFollower _ _ true; SendFollower _ _ stamp;
+   HearOwner _ _ (S place)].
 
 Lemma run_app : forall a s b, run s (a ++ b) = match run s a with Some t => run t b | None => None end.
 Proof. induction a as [|e a IH]; simpl; intros s b; auto. destruct (apply s e); auto. Qed.
@@ -89,7 +90,7 @@ Proof.
   assert (Heard : hear_followed Divider contract_rules f (owner_message Divider stamp o) = f1).
   { unfold hear_followed, owner_message. simpl. rewrite (not_void _ Vo), (Ra fa Vf) by reflexivity.
     simpl. rewrite Ls. reflexivity. }
-  assert (Decided : exists f2, decide Divider Segment inside_follower contract_rules f1 (next fm) = f2 /\
+  assert (Decided : exists f2, decide Divider Segment inside_follower contract_rules f1 (next fm) true = f2 /\
     f_hash Divider f2 = h /\ f_agreement f2 = Same /\ d_number (f_decided f2) = n /\ 0 < n /\
     (S dn = n -> inside_follower d (next fm) = true -> d_accepted (f_decided f2) = true)).
   { eexists. split; [reflexivity|]. unfold decide. simpl. destruct (n <=? dn) eqn:L.

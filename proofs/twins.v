@@ -60,7 +60,7 @@ Ltac broken := split; [no_plane | unfold have_passed; simpl; lia].
 
 (** Steps in which a proposal is sent, decided and answered. The places of both messages are given. *)
 Definition exchange (stamp place : nat) : list (event nat nat) := [
-  SendOwner _ _ stamp; HearFollower _ _ place; RenewFollower _ _;
+  SendOwner _ _ stamp; HearFollower _ _ place; RenewFollower _ _ true;
   SendFollower _ _ stamp; HearOwner _ _ (S place)].
 
 (** ** The contract is not stuck *)
@@ -83,7 +83,7 @@ Theorem a_plane_is_refused : exists s,
   follower_planes _ (follower _ _ s) = [5].
 Proof.
   trace Here Here (@nil (message nat)) (
-    [CommandFollower nat nat 7; RenewFollower _ _; RenewOwner _ _ (Some 9)] ++ exchange 1 0 ++
+    [CommandFollower nat nat 7; RenewFollower _ _ true; RenewOwner _ _ (Some 9)] ++ exchange 1 0 ++
     [RenewOwner _ _ (Some 6)]).
   simpl. auto.
 Qed.
@@ -135,7 +135,7 @@ Theorem without_waiting : exists s,
     decides_once := true; compares_hash := true; saves_first := true |} Here Here s /\ is_broken s.
 Proof.
   trace Here Here (@nil (message nat))
-    [RenewOwner nat nat (Some 3); SendOwner _ _ 1; RenewOwner _ _ (Some 9); HearFollower _ _ 0; RenewFollower _ _;
+    [RenewOwner nat nat (Some 3); SendOwner _ _ 1; RenewOwner _ _ (Some 9); HearFollower _ _ 0; RenewFollower _ _ true;
      CommandOwner _ _ 5; CommandFollower _ _ 3]. broken.
 Qed.
 
@@ -155,8 +155,8 @@ Theorem without_single_decision : exists s,
     decides_once := false; compares_hash := true; saves_first := true |} Here Here s /\ ~ have_common_plane _ _ s.
 Proof.
   trace Here Here (@nil (message nat)) (
-    [CommandFollower nat nat 7; RenewFollower _ _; RenewOwner _ _ (Some 9)] ++ exchange 1 0 ++
-    [RenewOwner _ _ None; CommandFollower _ _ 10; RenewFollower _ _]). no_plane.
+    [CommandFollower nat nat 7; RenewFollower _ _ true; RenewOwner _ _ (Some 9)] ++ exchange 1 0 ++
+    [RenewOwner _ _ None; CommandFollower _ _ 10; RenewFollower _ _ true]). no_plane.
 Qed.
 
 (** A vehicle reads messages with another hash: the answer of an earlier flight. *)

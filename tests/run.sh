@@ -45,8 +45,12 @@ with_program() {
     "target/$1/bin/python" -m unittest discover --verbose --start-directory "$2"
 }
 
-# The proofs of the contract of the shield, and copies with a defect.
-proofs() { sh proofs/check.sh; }
+# The proofs of the contract of the shield, and copies with a defect. Then logs of flights, and changed copies of them.
+proofs() {
+    sh proofs/check.sh
+    cargo build --quiet $rust --bin tautline
+    python3 -m unittest discover --verbose --start-directory tests/proofs
+}
 
 # The GitHub action, hook and archives, and packages.
 ci() { with_program cluster tests/ci; }

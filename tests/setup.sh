@@ -51,9 +51,11 @@ if needed_by crates ignored film; then
         debian xvfb xdotool libx11-6 libx11-xcb1 libxcursor1 libxi6 libxrandr2 libxkbcommon-x11-0
 fi
 
-# The checker of proofs/.
+# The checker of proofs/, and the compiler and integers of proofs/replay.
 if needed_by proofs; then
     has coqc && has coqchk || debian coq
+    ls "$(ocamlfind query zarith 2>/dev/null)/zarith.cmxa" >/dev/null 2>&1 ||
+        debian ocaml ocaml-findlib libzarith-ocaml-dev
 fi
 
 # Builds a program from source into target/FOLDER/bin: tool FOLDER PROGRAM [options of cargo install] NAME@VERSION

@@ -8,9 +8,10 @@ use clap::{Args, Parser};
 use super::console::{self, Console, Terminal};
 use super::json::JsonArgument;
 use super::{Exit, completions};
+use tautline_core::option::CONTRACT_LOG;
 use tautline_report::figures::Format;
 use tautline_report::request::{
-    Failure, Monitor as _, Pictures, RunRequest, ScenarioRequest, command_line, identify, run_into,
+    Failure, Monitor as _, Pictures, RunRequest, ScenarioRequest, command_line, identify, outputs, run_into,
 };
 use tautline_sim::preflight::Preflight;
 
@@ -97,6 +98,9 @@ pub(super) struct RunArguments {
     /// Repeat the flight at half the step, and report the differences.
     #[arg(long)]
     verify: bool,
+    /// Write each event of the shield's contracts, for `proofs/replay` (proofs/README.md).
+    #[arg(long, value_name = "FILE")]
+    contract_log: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgument,
     /// Print all findings: formation, energy, commands, velocities, radio, shield, times.
@@ -120,7 +124,10 @@ impl RunArguments {
 
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json.is_piped(), quiet: arguments.quiet };
-    arguments.json.check(&arguments.what.scenario, arguments.force)?;
+    let log = arguments.contract_log.iter().map(|file| (CONTRACT_LOG.to_string(), file.as_path()));
+    let outputs = arguments.json.file().into_iter().chain(log.clone());
+    outputs::check_new(&arguments.what.scenario, outputs, arguments.force)?;
+    log.into_iter().try_for_each(|(option, file)| outputs::refuse_standard_output(&option, file))?;
     let terminal = Terminal::new(console)?;
     if arguments.watch {
         return watch(arguments, &terminal);
@@ -160,6 +167,7 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
         free_steps: arguments.free_steps,
         verify: arguments.verify,
         threads: arguments.threads.map(usize::from),
+        contract_log: arguments.contract_log.clone(),
         verbose: arguments.verbose,
         ..RunRequest::new(&scenario, repeat(&words))
     };

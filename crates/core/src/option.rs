@@ -128,6 +128,7 @@ options! {
     CLOCK = "clock" "clock" Word;
     COLUMN = "column" "column" NamedWord;
     COMPRESSED = "compressed" "compressed" Flag;
+    CONTRACT_LOG = "contract-log" "contract_log" Number;
     CSV = "csv" "csv" Number;
     CYLINDER = "cylinder" "cylinder" Number;
     DELTA = "delta" "delta" Number;

@@ -42,6 +42,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::agenda::Horizon;
 use crate::choice::Reach;
+use crate::log::ContractView;
 use crate::plane::{Divider, Metric, Plane, Segment};
 use crate::start::{Start, hash_of_pair};
 
@@ -189,7 +190,7 @@ impl Side {
         divider.owner_plane(self.metric, self.margin_m)
     }
 
-    fn follower_plane(&self, divider: &Divider) -> Plane {
+    pub(crate) fn follower_plane(&self, divider: &Divider) -> Plane {
         divider.follower_plane(self.metric, self.margin_m)
     }
 }
@@ -444,6 +445,12 @@ impl Owned {
         self.is_pending.then(|| side.owner_plane(&self.proposed.divider))
     }
 
+    /// Returns the contract for a log.
+    pub(crate) fn view(&self) -> ContractView {
+        let pending = self.is_pending.then_some(self.proposed);
+        ContractView::Owner { held: self.held, pending, heard: self.decision }
+    }
+
     /// Returns the pending proposal to be sent.
     #[inline]
     pub(crate) fn proposal(&self) -> Option<Proposal> {
@@ -544,6 +551,11 @@ impl Followed {
     #[cfg(test)]
     pub(crate) fn held(&self) -> Plane {
         self.held
+    }
+
+    /// Returns the contract for a log.
+    pub(crate) fn view(&self) -> ContractView {
+        ContractView::Follower { held: self.held, heard: self.proposal, decided: self.decided }
     }
 
     /// Returns the last decision.

@@ -11,6 +11,7 @@ use crate::contract::{
     Agreement, Broadcast, Entry, Followed, Heard, Instant, Message, Owned, Renewed, divider_of_starts,
 };
 use crate::fleet::{PairRoom, closest_starts};
+use crate::log::ContractView;
 use crate::plane::Segment;
 use crate::report::SharedStarts;
 use crate::settings::{ShieldError, ShieldFault};
@@ -140,6 +141,16 @@ impl Contracts {
     /// Announced start of the vehicle.
     pub(crate) fn own(&self) -> &Start {
         &self.starts[self.index as usize]
+    }
+
+    /// Returns the contract with another vehicle, for a log. `None` while it is that of the starts.
+    pub(crate) fn view(&self, other: usize) -> Option<ContractView> {
+        let place = (*self.places.get(other)? as usize).checked_sub(1)?;
+        if other < self.index as usize {
+            self.followed.get(place).map(Followed::view)
+        } else {
+            self.owned.get(place).map(Owned::view)
+        }
     }
 
     /// Returns the contract with a vehicle of a larger number, at the start.

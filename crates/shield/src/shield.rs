@@ -11,6 +11,7 @@ use crate::brake::State;
 use crate::choice::{Chosen, Reach};
 use crate::contract::{Broadcast, Heard, Instant, Message};
 use crate::contracts::Contracts;
+use crate::log::ContractView;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
 use crate::report::{Assumption, Counters, SharedStarts, assumptions};
@@ -464,6 +465,26 @@ impl Shield {
     #[must_use]
     pub fn segment(&self) -> Segment {
         self.segment
+    }
+
+    /// Number of the vehicle, for a log.
+    pub(crate) fn index(&self) -> usize {
+        self.contracts.index().into()
+    }
+
+    /// Number of instants so far, for a log.
+    pub(crate) fn period(&self) -> u64 {
+        self.period
+    }
+
+    /// Announced starts of all vehicles, for a log.
+    pub(crate) fn starts(&self) -> &[Start] {
+        self.contracts.starts()
+    }
+
+    /// Returns the contract with another vehicle, for a log.
+    pub(crate) fn contract_with(&self, other: usize) -> Option<ContractView> {
+        self.contracts.view(other)
     }
 
     /// Numbers of the flight so far.

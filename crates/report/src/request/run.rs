@@ -1,10 +1,10 @@
 //! `run_into`: flies a scenario and writes its recording, report, figures and pictures.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::ThreadPool;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
@@ -17,12 +17,14 @@ use crate::replay::{NoReplay, PAGE_BYTES, Replay, Stage};
 use crate::report::{Report, RunPage};
 use crate::run::{run_with, verify};
 use tautline_audit::MovingObstacle;
-use tautline_core::files::write_atomically;
+use tautline_core::files::{FileError, write_atomically, write_atomically_with};
+use tautline_core::option::CONTRACT_LOG;
 use tautline_core::text::seconds;
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_sim::plant::FreeSteps;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
+use tautline_sim::shield::ContractLog;
 use tautline_sim::sim::Components;
 
 /// Name of the recording in the folder of a run.
@@ -57,6 +59,8 @@ pub struct RunRequest<'a> {
     /// Number of threads; a flight uses at most two. By default the number of cores. The recording has the same
     /// bits for any number.
     pub threads: Option<usize>,
+    /// File for the log of the shield's contracts, if one is written.
+    pub contract_log: Option<PathBuf>,
     /// Whether all findings are printed. Otherwise the verdict, the smallest distances and the audit are printed.
     pub verbose: bool,
     /// Whether the report contains wall-clock times. Without them equal flights give equal bytes.
@@ -67,7 +71,7 @@ impl<'a> RunRequest<'a> {
     /// Returns a request with figures and times, into `out/NAME`.
     #[must_use]
     pub fn new(scenario: &'a Scenario, command: String) -> Self {
-        let (out, threads, formats) = (None, None, vec![Format::Svg]);
+        let (out, threads, contract_log, formats) = (None, None, None, vec![Format::Svg]);
         Self {
             scenario,
             command,
@@ -79,6 +83,7 @@ impl<'a> RunRequest<'a> {
             free_steps: false,
             verify: false,
             threads,
+            contract_log,
             verbose: false,
             is_timed: true,
         }
@@ -124,6 +129,10 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         monitor.warn(&format!("note: {note}"));
     }
     // All checks of the input precede the first write.
+    if request.contract_log.is_some() && scenario.shield_limits()?.is_none() {
+        let message = format!("{CONTRACT_LOG}: the scenario `{}` has no shield", scenario.name);
+        return Err(Failure::input("usage/no-effect", message, "set shield.enabled=true"));
+    }
     let path = request.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(request.force)?;
@@ -133,7 +142,11 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         if request.free_steps {
             parts = parts.with_free_steps(FreeSteps::Compared);
         }
-        fly((scenario, &preflight), parts, &folder, pictures, monitor, &mut log)
+        let mut flight = |parts| fly((scenario, &preflight), parts, &folder, pictures, monitor, &mut log);
+        match &request.contract_log {
+            None => flight(parts),
+            Some(path) => write_atomically_with(path, |file| fly_logged(parts, (path, file), flight)),
+        }
     })?;
     if let Some(closest) = report.closest_pair() {
         log.conclude(closest.separation_m, closest.time_s);
@@ -164,6 +177,9 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         monitor.say(&reason.to_string());
     }
     monitor.say(&format!("wrote {} with a replay, report.json and {RECORDING}", page.display()));
+    if let Some(path) = &request.contract_log {
+        monitor.say(&format!("wrote {}", path.display()));
+    }
     if request.free_steps && report.run.engine_steps.is_none_or(|made| made >= report.run.steps) {
         monitor.warn("note: no step left out the engine: that needs the plant rapier and vehicles out of contact");
     }
@@ -206,6 +222,21 @@ fn fly(
     };
     let report = flown?;
     closed?;
+    Ok(report)
+}
+
+/// Flies with a log of the contracts, and ends the log.
+fn fly_logged(
+    mut parts: Components,
+    (path, file): (&Path, &File),
+    flight: impl FnOnce(Components) -> Result<Report, Failure>,
+) -> Result<Report, Failure> {
+    let file = file.try_clone().map_err(|source| FileError::new(path, source))?;
+    let log = Arc::new(Mutex::new(ContractLog::new(Box::new(file))));
+    parts.contract_log = Some(Arc::clone(&log));
+    let report = flight(parts)?;
+    let ended = log.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    ended.map_err(|source| FileError::new(path, source))?;
     Ok(report)
 }
 

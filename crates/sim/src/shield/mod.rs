@@ -26,6 +26,7 @@ mod tracking;
 pub use identify::{Identification, TRACKING_FACTOR};
 pub(crate) use stage::ShieldStage;
 pub use stage::{ShieldBreach, ShieldReport};
+pub use tautline_shield::ContractLog;
 pub(crate) use tracking::TrackingBasis;
 
 use nalgebra::Vector3;

@@ -1,6 +1,7 @@
 //! The shield in flight: filters commands, carries contracts over the radio, observes the bounds.
 
 use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +14,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
 use tautline_laws::law::LawError;
 use tautline_shield::report::Exceeded;
-use tautline_shield::{Broadcast, Counters, Fleet, Limits, Settings, Shield, State, Timing};
+use tautline_shield::{Broadcast, ContractLog, Counters, Fleet, Limits, Settings, Shield, State, Timing};
 
 /// Numbers of a shielded flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +81,23 @@ pub(crate) struct ShieldStage {
     undefined: u64,
     /// Number of those instants at which the law failed or commanded numbers that are not finite.
     failed: u64,
+    log: LogSlot,
+}
+
+/// Contract log of a flight, if one is written. A copy of a flight writes none.
+#[derive(Default)]
+struct LogSlot(Option<Arc<Mutex<ContractLog>>>);
+
+impl LogSlot {
+    fn open(&self) -> Option<MutexGuard<'_, ContractLog>> {
+        Some(self.0.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Clone for LogSlot {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
 }
 
 impl ShieldStage {
@@ -111,7 +129,16 @@ impl ShieldStage {
             commands: vec![Vector3::zeros(); count],
             undefined: 0,
             failed: 0,
+            log: LogSlot::default(),
         }))
+    }
+
+    /// Begins a contract log at the start of the flight.
+    pub(crate) fn begin_log(&mut self, log: Arc<Mutex<ContractLog>>) {
+        self.log = LogSlot(Some(log));
+        if let Some(mut log) = self.log.open() {
+            log.begin(&self.fleet);
+        }
     }
 
     /// Counts an instant without a finite command of the law for some vehicle. The shield brakes such a vehicle, and
@@ -164,6 +191,15 @@ impl ShieldStage {
                 }
             }
         });
+        if let Some(mut log) = self.log.open() {
+            let heard = self.fleet.shields().iter().zip(&round.content).zip(&self.hangs.elapsed);
+            for ((shield, broadcast), _) in heard.filter(|(_, elapsed)| elapsed.is_some()) {
+                log.filtered(shield);
+                if sends {
+                    log.sent(broadcast);
+                }
+            }
+        }
         for (i, shielded) in self.commands.iter().enumerate() {
             set_row(command, i, *shielded);
         }
@@ -211,11 +247,15 @@ impl ShieldStage {
     }
 
     fn deliver(&mut self, time_s: f64) {
-        let Self { fleet, radio, .. } = self;
+        let Self { fleet, radio, log, .. } = self;
+        let mut log = log.open();
         radio.deliver(time_s, |round, has_arrived| {
             let messages = round.content.iter().flat_map(Broadcast::messages);
             for (message, _) in messages.zip(has_arrived).filter(|(_, has_arrived)| *has_arrived) {
                 fleet.hear(&message);
+                if let Some(log) = &mut log {
+                    log.heard(&message);
+                }
             }
         });
     }

@@ -1,5 +1,7 @@
 //! Maps the true state to accelerations: sense, supervise, command, actuate.
 
+use std::sync::{Arc, Mutex};
+
 use super::ending::SimError;
 use crate::link::Imperfections;
 use crate::plant::Feedback;
@@ -12,6 +14,7 @@ use tautline_laws::law::{Certificate, Law, LawError, certificate_through};
 use tautline_laws::observation::{Observation, OtherStates};
 use tautline_laws::space::{Metric, VerletList};
 use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
+use tautline_shield::ContractLog;
 
 /// Control loop between the true state and the actuators, with all of its memory.
 #[derive(Clone)]
@@ -63,6 +66,14 @@ impl Controller {
             begins: false,
             commanded,
         })
+    }
+
+    /// Returns this controller, whose shield writes a log of its contracts if there is one.
+    pub(super) fn with_contract_log(mut self, log: Option<Arc<Mutex<ContractLog>>>) -> Self {
+        if let (Some(shield), Some(log)) = (&mut self.shield, log) {
+            shield.begin_log(log);
+        }
+        self
     }
 
     /// Senses at an instant of the flight, lets the supervisor change the target, and writes the law's command if

@@ -2,6 +2,7 @@
 
 mod step;
 
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::controller::Controller;
@@ -18,6 +19,7 @@ use tautline_core::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
 use tautline_laws::law::{Certificate, Law, VoidReason};
 use tautline_laws::observation::Observation;
 use tautline_laws::target::{Schedule, Supervisor, Target};
+use tautline_shield::ContractLog;
 
 /// Flight in progress: law, link, supervisor, vehicles and audit, with all of their memory.
 ///
@@ -111,7 +113,7 @@ impl Simulation {
     }
 
     fn at_start(scenario: &Scenario, parts: Components, awaits_command: bool) -> Result<Self, SimError> {
-        let Components { law, plant, link, supervisor } = parts;
+        let Components { law, plant, link, supervisor, contract_log } = parts;
         let count = scenario.count();
         if plant.count() != count {
             return Err(SimError::Vehicles { expected: count, found: plant.count() });
@@ -129,7 +131,7 @@ impl Simulation {
         let other_law = flies_another.then(|| Event::OtherLaw { time_s: 0.0, name: law.name().to_owned() });
         let channels = Channels::of(plant.as_ref(), link.as_ref());
         let mut simulation = Self {
-            controller: Controller::new(scenario, law, link, supervisor)?,
+            controller: Controller::new(scenario, law, link, supervisor)?.with_contract_log(contract_log),
             plant,
             certificate,
             judge: Judge::new(scenario)?,
@@ -439,6 +441,8 @@ pub struct Components {
     pub link: Box<dyn Imperfections>,
     /// Supervisor that changes the target.
     pub supervisor: Box<dyn Supervisor>,
+    /// Log of the shield's contracts, if one is to be written. The caller ends it after the flight.
+    pub contract_log: Option<Arc<Mutex<ContractLog>>>,
 }
 
 impl Components {
@@ -470,7 +474,7 @@ impl Components {
             }
             None => supervisor,
         };
-        Self { law, plant: plant::of(scenario), link, supervisor: Box::new(supervisor) }
+        Self { law, plant: plant::of(scenario), link, supervisor: Box::new(supervisor), contract_log: None }
     }
 }
 
