@@ -25,7 +25,7 @@
 //! instants, for any sequence of times. The proof does not depend on how V was found.
 //!
 //! # Enclosure
-//! V is stored at [`NODES`] directions of half a circle. Between two of them it is at most their combination, because
+//! V is stored at 256 directions of half a circle. Between two of them it is at most their combination, because
 //! a norm is convex. With n cells of length c in \[0, H\], Phi(T)' z is on each cell the linear interpolation of its
 //! ends plus a remainder. The remainder is at most c^2/8 times its largest second derivative, so V is at most the
 //! larger one of its ends plus V of the remainder. The same holds for b, for c, and for the integral, whose slope
@@ -39,9 +39,9 @@
 //! is refused.
 //!
 //! # Rounding
-//! Numbers of F are sums of fewer than 300 products. Each is at most the largest value of V or of the inputs, and the
-//! factors of a combination have condition 1 / sin(pi / [`NODES`]) < 100. [`ROUNDING`] times the largest value covers
-//! their rounding and is part of `rest`. The results are multiplied by 1 + 1e-9.
+//! Numbers of F are sums of fewer than 300 products. Each is at most the largest value of V or of the inputs. The
+//! factors of a combination have the condition 1 / sin(pi / 256), which is below 100. A part of 1e-11 of the largest
+//! value covers their rounding, and is in `rest`. The results are multiplied by 1 + 1e-9.
 
 use super::{TrackerLoop, Tube, TubeError};
 
