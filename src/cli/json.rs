@@ -10,6 +10,18 @@ use tautline_core::files::write_atomically;
 use tautline_report::request::Failure;
 use tautline_report::request::outputs::{self, NamedPath, is_standard_output};
 
+/// Rejects a file of an option in a folder of the command, which may hold its own files.
+pub(super) fn check_outside(option: &str, file: &Path, folder: &Path) -> Result<(), Failure> {
+    let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let places = [parent, folder].map(std::fs::canonicalize);
+    let is_inside = matches!(&places, [Ok(parent), Ok(folder)] if parent.starts_with(folder));
+    if is_inside || file.starts_with(folder) {
+        let message = format!("{option}: {} is in the folder {}", file.display(), folder.display());
+        return Err(Failure::input("files/overwrites-input", message, "write into another folder"));
+    }
+    Ok(())
+}
+
 /// Place of an answer as JSON.
 #[derive(Clone, Debug, Args)]
 pub(super) struct JsonArgument {
@@ -53,15 +65,7 @@ impl JsonArgument {
 
     /// Rejects a file in a folder of the command, which may hold its own files.
     pub(super) fn check_outside(&self, folder: &Path) -> Result<(), Failure> {
-        let Some((_, file)) = self.file() else { return Ok(()) };
-        let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let places = [parent, folder].map(std::fs::canonicalize);
-        let is_inside = matches!(&places, [Ok(parent), Ok(folder)] if parent.starts_with(folder));
-        if is_inside || file.starts_with(folder) {
-            let message = format!("--json: {} is in the folder {}", file.display(), folder.display());
-            return Err(Failure::input("files/overwrites-input", message, "write into another folder"));
-        }
-        Ok(())
+        self.file().map_or(Ok(()), |(option, file)| check_outside(&option, file, folder))
     }
 
     /// Writes an answer if the option is given.

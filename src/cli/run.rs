@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, Parser};
 
 use super::console::{self, Console, Terminal};
-use super::json::JsonArgument;
+use super::json::{JsonArgument, check_outside};
 use super::{Exit, completions};
 use tautline_core::option::CONTRACT_LOG;
 use tautline_report::figures::Format;
@@ -144,6 +144,9 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
     let scenario = flown.read()?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     arguments.json.check_outside(&folder)?;
+    if let Some(file) = &arguments.contract_log {
+        check_outside(&CONTRACT_LOG.to_string(), file, &folder)?;
+    }
     let plant = arguments.plant.iter().flat_map(|kind| ["--plant", kind]);
     let sets = what.overrides.iter().flat_map(|text| ["--set", text.as_str()]);
     let repeat = |words: &[&str]| match (&*what.argument, &arguments.out) {

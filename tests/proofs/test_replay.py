@@ -100,7 +100,8 @@ class Arguments(InFolder):
     def test_an_existing_file_and_standard_output_are_refused(self):
         log = self.folder / "there.log"
         log.write_text("kept")
-        for place, message in [(log, "exists"), ("-", "cannot go to standard output")]:
+        inside = self.folder / "out/report.json"
+        for place, message in [(log, "exists"), ("-", "cannot go to standard output"), (inside, "is in the folder")]:
             done = tautline("run", "shielded-crazyflies", "--out", self.folder / "out", "--contract-log", place)
             self.assertEqual(done.returncode, 2)
             self.assertIn(message, done.stderr)
