@@ -453,7 +453,7 @@ impl Settings {
             return fails("a22_per_s", problem, self.a22_per_s, "lower its magnitude or shorten the period");
         }
         if self.elapsed_error_s > 0.0 && !is_irregular {
-            let problem = "must be 0 without `period_tolerance` and `hang_periods`, whose times it is about";
+            let problem = "has an effect only with `period_tolerance` or `hang_periods`";
             return fails("elapsed_error_s", problem, self.elapsed_error_s, "give the tolerance of the period");
         }
         if self.measurement_age_s > MAX_DELAY as f64 * self.period_s {

@@ -363,7 +363,7 @@ impl Shield {
             return None;
         }
         let mut state = if is_before_start { self.contracts.own().state } else { measured };
-        // The measurement was taken so long after the begin of the first leg.
+        // Time from the begin of the first leg to the measurement.
         let mut skipped_s = (-left_s).max(0.0);
         let a22 = self.limits.settings().a22_per_s;
         for leg in self.legs.range(first..) {

@@ -297,7 +297,8 @@ impl Law for CbfQpLaw {
     }
 
     fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
-        Certificate::void(VoidReason::CommandLimited)
+        let is_braking = self.braking.is_some();
+        Certificate::void(if is_braking { VoidReason::NoBoundComputed } else { VoidReason::CommandLimited })
     }
 
     fn capabilities(&self) -> Capabilities {
@@ -308,11 +309,13 @@ impl Law for CbfQpLaw {
         }
     }
 
-    /// A vehicle without neighbours follows x'' = -c x' - k x. With neighbours in range no bound is known: a corner of
+    /// A vehicle without neighbours follows x'' = -c x' - k x; in the braking variant its speed approaches the largest
+    /// one at most at the rate kappa. With neighbours in range no bound is known: a corner of
     /// several half-spaces may move as fast as two of their planes close. The law controls absolute positions, and a22
     /// is compensated.
     fn rates(&self, query: &RateQuery) -> Rates {
-        let alone_per_s = self.keys.c_per_s.max(self.keys.k_per_s2.sqrt());
+        let speed_limit_per_s = self.braking.map_or(0.0, |braking| braking.approach_per_s);
+        let alone_per_s = self.keys.c_per_s.max(self.keys.k_per_s2.sqrt()).max(speed_limit_per_s);
         let is_alone = query.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
         Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(query) }
     }

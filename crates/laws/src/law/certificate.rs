@@ -51,6 +51,9 @@ pub enum VoidReason {
     /// The law limits its command, and the acceleration that keeps vehicles apart may be larger.
     #[error("The law limits its command: the acceleration that keeps vehicles apart may exceed the limit.")]
     CommandLimited,
+    /// The law has a proof, but no bound for a scenario is computed from it.
+    #[error("No bound is computed from the proof of the law.")]
+    NoBoundComputed,
     /// The target changes during the run.
     #[error("The target changes during the run: the law's proof does not cover the change.")]
     TargetChanges,
@@ -135,6 +138,7 @@ impl_coded! { VoidReason {
     Self::GraphNotComplete => "graph-not-complete",
     Self::VelocityUndamped => "velocity-undamped",
     Self::CommandLimited => "command-limited",
+    Self::NoBoundComputed => "no-bound-computed",
     Self::TargetChanges => "target-changes",
     Self::InexactLink => "inexact-link",
     Self::SensingDelayed => "sensing-delayed",
@@ -242,6 +246,7 @@ mod tests {
             VoidReason::GraphNotComplete,
             VoidReason::VelocityUndamped,
             VoidReason::CommandLimited,
+            VoidReason::NoBoundComputed,
             VoidReason::TargetChanges,
             VoidReason::InexactLink,
             VoidReason::SensingDelayed,
@@ -272,6 +277,7 @@ mod tests {
             "graph-not-complete",
             "velocity-undamped",
             "command-limited",
+            "no-bound-computed",
             "target-changes",
             "inexact-link",
             "sensing-delayed",

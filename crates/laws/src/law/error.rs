@@ -232,7 +232,8 @@ pub enum ParameterError {
     },
     /// The velocity coefficient a22 accelerates a vehicle more than its brake decelerates it.
     #[error(
-        "max_speed_m_s is {max_speed_m_s}, where a22 = {a22_per_s} 1/s takes up the brake of {max_accel_m_s2} m/s^2"
+        "max_speed_m_s is {max_speed_m_s}: there a22 = {a22_per_s} 1/s accelerates by more than the brake of \
+         {max_accel_m_s2} m/s^2"
     )]
     CannotBrake {
         /// Largest speed \[m/s\].

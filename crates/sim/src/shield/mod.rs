@@ -122,7 +122,7 @@ pub struct ShieldSpec {
     #[schemars(extend("default" = 0, "minimum" = 0, "maximum" = 20))]
     pub hang_periods: usize,
     /// Share of the instants after which the computer of a vehicle misses 1 to `hang_periods` instants in the flight;
-    /// the number is random (`noise_seed`).
+    /// the number is random (`noise.seed`).
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0, "maximum" = 1))]
     pub hang_share: f64,

@@ -216,7 +216,7 @@ impl ShieldStage {
         let delay = settings.map_or(0, |settings| settings.measurement_delay_periods);
         let aged = self.age_s / self.period_s;
         if !is_whole(aged) {
-            // No instant is that old.
+            // No instant has this age.
             return;
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 20 periods")]

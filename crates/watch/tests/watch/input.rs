@@ -201,7 +201,7 @@ fn a_flood_of_one_vehicle_leaves_a_part_of_the_past_unjudged() {
 fn memory_does_not_grow_with_time() {
     let mut monitor = monitor(settings());
     let is_long = std::env::var_os("TAUTLINE_LONG").is_some();
-    // 24 h of 20 vehicles at 50 Hz, or three minutes.
+    // 20 vehicles at 50 Hz, over 24 h with TAUTLINE_LONG and else over three minutes.
     let rounds = if is_long { 24 * 3600 * 50 } else { 180 * 50 };
     let ids: Vec<_> = (0..20).map(|k| format!("v{k}")).collect();
     let mut capacity = None;

@@ -17,7 +17,9 @@
 //! n . v >= 0, and p does not approach the plane. Hence h' >= -kappa h, also where the closest points are not unique.
 //!
 //! # Feasibility
-//! With the deceleration |v|/L'(|v|) against the velocity, s' = 0: this command is in all half-spaces while h >= 0.
+//! With the deceleration |v|/L'(|v|) against the velocity, s' = 0: this command is in all half-spaces while h >= 0. It
+//! is at most A unless drag alone decelerates by more than 2 A. Then no command may be feasible, and the brake, which
+//! keeps h from falling, is commanded.
 
 use nalgebra::Vector3;
 
