@@ -85,6 +85,8 @@ let entry = function
   | ["hold"; a; b; x; y; z; c] -> Model.Hold (count a, count b, [divider [x; y; z; c]])
   | ["hold"; a; b; x; y; z; c; x'; y'; z'; c'] ->
       Model.Hold (count a, count b, [divider [x; y; z; c]; divider [x'; y'; z'; c']])
+  | ["moved"; v] ->
+      raise (Denied (Printf.sprintf "vehicle %s did not fly the segment that it had reserved" (Z.to_string (count v))))
   | ["foreign"; a; b] ->
       let a = Z.to_string (count a) and b = Z.to_string (count b) in
       raise (Denied (Printf.sprintf "vehicle %s holds a plane towards %s that no event gave it" a b))
@@ -178,6 +180,7 @@ let rec replay log vertical rows totals words =
         raise (Denied "the log has other numbers of events, instants and messages than its last line states");
       if not (Model.is_complete rows) then raise (Denied "the planes at the end of a vehicle are missing");
       if pos_in log.channel <> log.size then malformed "bytes follow the line \"end\"";
+      if totals.instants = 0 then malformed "the log has no instant, so nothing was flown";
       if checked log.before <> check then malformed "a line was altered: the CRC-32 of the log differs";
       (rows, { totals with events = totals.events - 1 })
   | _ ->
@@ -233,10 +236,13 @@ let () =
       match open_in_bin path with
       | exception Sys_error problem -> unreadable problem
       | channel -> (
-          let log = { channel; size = in_channel_length channel; number = 0; check = 0xFFFFFFFF; before = 0xFFFFFFFF } in
-          match check log with
-          | () -> ()
-          | exception Denied why -> Printf.printf "DENIED: %s, line %d: %s\n" path log.number why; exit 1
-          | exception Malformed why -> Printf.printf "%s, line %d: %s\n" path log.number why; exit 2
-          | exception Sys_error problem -> unreadable problem))
+          match in_channel_length channel with
+          | exception Sys_error problem -> unreadable problem
+          | size -> (
+              let log = { channel; size; number = 0; check = 0xFFFFFFFF; before = 0xFFFFFFFF } in
+              match check log with
+              | () -> ()
+              | exception Denied why -> Printf.printf "DENIED: %s, line %d: %s\n" path log.number why; exit 1
+              | exception Malformed why -> Printf.printf "%s, line %d: %s\n" path log.number why; exit 2
+              | exception Sys_error problem -> unreadable problem)))
   | _ -> prerr_endline "usage: replay FILE, a log of `tautline run --contract-log FILE`"; exit 2

@@ -4,8 +4,8 @@
 //! so nothing is rounded. Vehicles are counted from 0. `proofs/README.md` lists the lines.
 //!
 //! The log is written by an observer. After each instant it reads the contracts of a vehicle and compares them with
-//! those that it read before. A line `foreign` names a vehicle that holds another plane than its events give. A flight
-//! without a log does none of this.
+//! those that it read before. A line `foreign` names a vehicle that holds another plane than its events give. A line
+//! `moved` names one that did not fly the segment that it had reserved. A flight without a log does none of this.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -34,6 +34,8 @@ pub struct ContractLog {
     count: usize,
     /// Planes of each vehicle towards each other one, by vehicle and then by other vehicle.
     known: Vec<Known>,
+    /// Segment that each vehicle reserved last.
+    reserved: Vec<Segment>,
     totals: LogTotals,
 }
 
@@ -75,7 +77,7 @@ impl ContractLog {
     pub fn new(out: Box<dyn Write + Send>) -> Self {
         let (text, totals) = (String::with_capacity(2 * BUFFER), LogTotals::default());
         let check = crc32fast::Hasher::new();
-        Self { out, text, check, error: None, count: 0, known: Vec::new(), totals }
+        Self { out, text, check, error: None, count: 0, known: Vec::new(), reserved: Vec::new(), totals }
     }
 
     /// Begins the log with the starts and first planes of a fleet at its start.
@@ -97,6 +99,7 @@ impl ContractLog {
                 self.line(format_args!("pair {i} {j} {hash:016x} {}", Bits(plane_numbers(&divider))));
             }
         }
+        self.reserved = starts.iter().map(|start| start.segment).collect();
         self.known.clear();
         for i in 0..starts.len() {
             for j in 0..starts.len() {
@@ -120,12 +123,16 @@ impl ContractLog {
         let i = shield.index();
         self.totals.instants += 1;
         self.event(format_args!("instant {i} {}", shield.period()));
+        if self.reserved.get(i) != Some(&shield.present_segment()) {
+            self.event(format_args!("moved {i}"));
+        }
         for j in (0..self.count).filter(|j| *j != i) {
             if let Some(view) = shield.contract_with(j) {
                 self.compare(shield, [i, j], view);
             }
         }
         self.event(format_args!("reserve {i} {}", Bits(numbers_of(&shield.segment()))));
+        self.reserved[i] = shield.segment();
     }
 
     /// Notes messages that a vehicle sent, lost or not.

@@ -16,7 +16,7 @@ const CHANGED_M_S2: f64 = 1e-9;
 const ROUNDING: f64 = 2.5e-7;
 
 /// Relative excess of a time that is rounding, as a factor.
-const TIME_ROUNDING: f64 = 1.0 + 1e-9;
+pub(crate) const TIME_ROUNDING: f64 = 1.0 + 1e-9;
 
 /// Counters of one vehicle, or of several after [`Counters::merge`]. A share that was never observed is `None`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

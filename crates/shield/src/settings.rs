@@ -292,8 +292,8 @@ impl Settings {
     /// a measurement of the largest known age T. With G = exp(a22 T) or 1, and m instants in that time:
     ///
     /// ```text
-    /// velocity   G (eps_v + W T) + A eps_t m (m + 1)
-    /// position   eps_p + G (eps_v T + W T^2/2) + A eps_t m (m + 1) T + 2 path errors
+    /// velocity   G (eps_v + W T + A eps_t m (m + 1))
+    /// position   eps_p + G (eps_v T + W T^2/2 + A eps_t m (m + 1) T) + 2 path errors
     /// ```
     ///
     /// With times known within `eps_t`, the j-th last change of the command, at most 2 A, is known within j `eps_t`.
@@ -307,8 +307,8 @@ impl Settings {
         let growth = (self.a22_per_s * age_s).exp().max(1.0) * (1.0 + 1e-12);
         let instants = (age_s / self.times_s()[0]).floor() + 1.0;
         let switched = self.accel_m_s2 * self.elapsed_error_s * instants * (instants + 1.0);
-        let velocity = growth * (errors[1] + push * age_s) + switched;
-        let moved = growth * (errors[1] * age_s + push * age_s * age_s / 2.0) + switched * age_s;
+        let velocity = growth * (errors[1] + push * age_s + switched);
+        let moved = growth * (errors[1] * age_s + push * age_s * age_s / 2.0 + switched * age_s);
         [errors[0] + moved + 2.0 * self.path_error_m, velocity]
     }
 
@@ -992,7 +992,9 @@ mod tests {
         assert!(refused(|settings| settings.period_tolerance = f64::NAN).starts_with("period_tolerance: must not be"));
         assert!(refused(|settings| settings.hang_periods = 21).starts_with("hang_periods: must be at most 20 periods"));
         assert!(refused(|settings| settings.measurement_age_s = 2.0).contains("at most 20 periods (2)"));
-        assert!(refused(|settings| settings.elapsed_error_s = 0.01).contains("must be 0 without `period_tolerance`"));
+        assert!(
+            refused(|settings| settings.elapsed_error_s = 0.01).contains("has an effect only with `period_tolerance`")
+        );
         let irregular = |change: fn(&mut Settings)| {
             refused(|settings| {
                 settings.period_tolerance = 0.1;

@@ -14,7 +14,7 @@ use crate::contracts::Contracts;
 use crate::log::ContractView;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
-use crate::report::{Assumption, Counters, SharedStarts, assumptions};
+use crate::report::{Assumption, Counters, SharedStarts, TIME_ROUNDING, assumptions};
 use crate::saved::{SavedShield, vector};
 use crate::settings::{Limits, NORMAL_M, ShieldError, ShieldFault, UNIT_ROUNDOFF};
 use crate::start::Start;
@@ -176,9 +176,11 @@ impl Shield {
         let contracts = Contracts::new(index, Arc::clone(starts))?;
         // The index is in the list.
         let own = &starts[index];
-        // At most 20 periods of at least half of the period.
+        // One more than the oldest measurement can need, because ages and times have rounding. At most 20 periods of at
+        // least half of the period.
+        let oldest_s = limits.settings().measurement_age_s * TIME_ROUNDING;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let most_legs = (limits.settings().measurement_age_s / limits.times_s()[0]).ceil() as usize;
+        let most_legs = if oldest_s > 0.0 { (oldest_s / limits.times_s()[0]).floor() as usize + 1 } else { 0 };
         Ok(Self {
             limits: *limits,
             period: 0,
@@ -322,7 +324,8 @@ impl Shield {
         if let Some(timing) = timing {
             let times_s = self.limits.times_s();
             if self.period > 0 {
-                self.counters.elapsed(timing.elapsed_s, times_s);
+                let error_s = self.limits.settings().elapsed_error_s;
+                self.counters.elapsed(timing.elapsed_s, [times_s[0] - error_s, times_s[1] + error_s]);
                 // A time that is not a number leaves the period.
                 elapsed_s = if timing.elapsed_s.is_nan() { period_s } else { timing.elapsed_s };
                 elapsed_s = elapsed_s.clamp(times_s[0], times_s[1]);
@@ -388,6 +391,10 @@ impl Shield {
         // The compared states are those of the instant, or both of an earlier one.
         let (measured, then) = if settings.measurement_age_s > 0.0 {
             let predicted = self.predicted(measured, age_s);
+            // An age beyond its bound is counted as such.
+            if predicted.is_none() && age_s <= settings.measurement_age_s * TIME_ROUNDING {
+                self.counters.missing();
+            }
             (predicted.unwrap_or(measured), predicted.and(Some(&self.reference)))
         } else {
             (measured, self.past.front().filter(|_| self.past.len() > settings.measurement_delay_periods))
@@ -465,6 +472,11 @@ impl Shield {
     #[must_use]
     pub fn segment(&self) -> Segment {
         self.segment
+    }
+
+    /// Segment that the reference reserves at this instant, for a log.
+    pub(crate) fn present_segment(&self) -> Segment {
+        Segment::new(self.reference.position_m, self.limits.envelope.brake.stop_m(&self.reference))
     }
 
     /// Number of the vehicle, for a log.

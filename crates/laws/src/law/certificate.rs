@@ -52,7 +52,7 @@ pub enum VoidReason {
     #[error("The law limits its command: the acceleration that keeps vehicles apart may exceed the limit.")]
     CommandLimited,
     /// The law has a proof, but no bound for a scenario is computed from it.
-    #[error("No bound is computed from the proof of the law.")]
+    #[error("The law has a proof, but no bound for a scenario is computed from it.")]
     NoBoundComputed,
     /// The target changes during the run.
     #[error("The target changes during the run: the law's proof does not cover the change.")]
@@ -308,7 +308,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[25].to_string(),
+            reasons[26].to_string(),
             "The law is undefined at the start: vehicles 1 and 2 are 1.500 m apart, not more than the safety distance \
              2.000 m."
         );

@@ -133,6 +133,10 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         let message = format!("{CONTRACT_LOG}: the scenario `{}` has no shield", scenario.name);
         return Err(Failure::input("usage/no-effect", message, "set shield.enabled=true"));
     }
+    if request.contract_log.is_some() && scenario.shield.is_some_and(|shield| shield.hang_share > 0.0) {
+        let message = format!("{CONTRACT_LOG}: the model has regular instants only, and shield.hang_share is above 0");
+        return Err(Failure::input("usage/no-effect", message, "set shield.hang_share=0"));
+    }
     let path = request.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(request.force)?;

@@ -70,6 +70,8 @@ pub(crate) struct ShieldStage {
     hangs: Hangs,
     /// Age of each measurement \[s\], for shields that predict the state from it.
     age_s: f64,
+    /// Whether the shields receive the times of their instants.
+    is_timed: bool,
     /// True states at the last instants, oldest first, for measurements of that age.
     truths: VecDeque<Swarm>,
     /// Time from which a vehicle no longer flies its reference \[s\].
@@ -122,6 +124,7 @@ impl ShieldStage {
             next_period: 0,
             hangs: Hangs::new(scenario, limits.settings()),
             age_s: limits.settings().measurement_age_s,
+            is_timed: times(&limits).next().is_some(),
             truths: VecDeque::new(),
             failed_from_s,
             measured: starts,
@@ -172,15 +175,14 @@ impl ShieldStage {
         let sends = self.has_round(time_s);
         let count = command.nrows();
         let mut round = self.radio.round(|| (0..count).map(|_| Broadcast::for_swarm(count)).collect());
-        let Self { fleet, measured, wanted, commands, hangs, age_s, period_s, .. } = self;
+        let Self { fleet, measured, wanted, commands, hangs, age_s, is_timed, period_s, .. } = self;
         each(fleet.shields_mut(), commands, &mut round.content, |i, shield, command, broadcast| {
             match hangs.elapsed[i] {
                 // The vehicle holds its command.
                 None => broadcast.entries.clear(),
                 Some(periods) => {
                     let timing = Timing { elapsed_s: f64::from(periods) * *period_s, age_s: *age_s };
-                    let is_timed = hangs.longest > 0 || *age_s > 0.0;
-                    *command = if is_timed {
+                    *command = if *is_timed {
                         shield.filter_timed(measured[i], wanted[i], timing)
                     } else {
                         shield.filter(measured[i], wanted[i])

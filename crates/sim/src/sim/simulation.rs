@@ -441,7 +441,8 @@ pub struct Components {
     pub link: Box<dyn Imperfections>,
     /// Supervisor that changes the target.
     pub supervisor: Box<dyn Supervisor>,
-    /// Log of the shield's contracts, if one is to be written. The caller ends it after the flight.
+    /// Log of the shield's contracts, if one is to be written. The caller ends it after the flight. A flight in which
+    /// vehicles miss instants (`shield.hang_share`) gives a log that the model forbids.
     pub contract_log: Option<Arc<Mutex<ContractLog>>>,
 }
 
