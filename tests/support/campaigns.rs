@@ -62,8 +62,7 @@ const STARTS: [Starts; 6] = [
     },
 ];
 
-/// Laws by name; `braking` is a variant of `cbf-qp`.
-const LAWS: [&str; 8] = ["edge-tension", "displacement", "potential", "orca", "bvc", "cbf-qp", "braking", "flocking"];
+const LAWS: [&str; 6] = ["edge-tension", "displacement", "potential", "orca", "cbf-qp", "flocking"];
 const DURATION_S: f64 = 60.0;
 
 impl Starts {
@@ -72,8 +71,7 @@ impl Starts {
         format!(
             "name = \"random-starts\"\nformation = {formation}\n[swarm]\ncount = {vehicles}\n\
              dimensions = {dimensions}\n[start]\nshape = \"random\"\nhalf_extent_m = {half_extent_m:?}\n\
-             [law]\ndelta_m = 1.0\n\
-             [laws.braking]\nkind = \"cbf-qp\"\nvariant = \"braking\"\n[time]\nduration_s = {DURATION_S:?}\n"
+             [law]\ndelta_m = 1.0\n[time]\nduration_s = {DURATION_S:?}\n"
         )
     }
 
