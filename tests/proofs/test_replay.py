@@ -97,6 +97,14 @@ class Arguments(InFolder):
         self.assertIn("set shield.enabled=true", done.stderr)
         self.assertFalse(log.exists() or (self.folder / "bare").exists())
 
+    def test_a_flight_with_hangs_is_refused(self):
+        log = self.folder / "hangs.log"
+        words = ["--set", "law.kind=laplacian", "--set", "shield={hang_periods=3, hang_share=0.5}"]
+        done = tautline("run", "swap", *words, "--out", self.folder / "bare", "--contract-log", log)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("set shield.hang_share=0", done.stderr)
+        self.assertFalse(log.exists() or (self.folder / "bare").exists())
+
     def test_an_existing_file_and_standard_output_are_refused(self):
         log = self.folder / "there.log"
         log.write_text("kept")
@@ -318,6 +326,7 @@ class Refused(InFolder):
         self.denied(self.log.replaced(place), "planes at the end of a vehicle are missing")
         self.denied(self.log.changed("hold", 6, flipped), "planes are not those that the vehicle holds")
         self.denied(self.log.replaced(place, f"foreign {words[1]} {words[2]}"), "that no event gave it")
+        self.denied(self.log.replaced(place, f"moved {words[1]}"), "did not fly the segment that it had reserved")
         instant = f"instant {words[1]} {int(self.log.find('instant', after=place // 2)[1][2]) + 1}"
         self.denied(self.log.replaced(place, " ".join(words), instant), "event follows the planes at the end")
 
