@@ -140,7 +140,7 @@ impl CbfQpKeys {
 ///
 /// # Braking variant
 /// The barrier of a pair is the distance of the two braking segments less D = delta + margin. Vehicle i keeps its stop
-/// point on its side of the mid-plane between the segments, and its speed below `v_max` ([`braking`]). If no
+/// point on its side of the mid-plane between the segments, and its speed below `v_max` (`cbf_qp/braking.rs`). If no
 /// acceleration is in all half-spaces, it brakes with up to `a_max` against its velocity.
 ///
 /// # Guarantee

@@ -336,7 +336,7 @@ fn count(sent: impl Fn(&mut Random) -> Sent, part: Part, runs: u64) -> Counts {
     found
 }
 
-/// Returns a number of runs, or a fifth of it unless TAUTLINE_LONG is set.
+/// Returns a number of runs, or a fifth of it unless `TAUTLINE_LONG` is set.
 fn runs_of(most: u64) -> u64 {
     if std::env::var_os("TAUTLINE_LONG").is_some() { most } else { most / 5 }
 }
