@@ -159,7 +159,7 @@ class Shield:
             raise Error(f"lost: must have the shape ({rows}, {rows}), got {drops.shape}; give a row per sender")
         for message in inbox:
             self._native.hear(_bytes(message))
-        commands = self._native.filter(*given, _times(elapsed_s, age_s))
+        commands = self._native.filter(given[0], given[1], given[2], _times(elapsed_s, age_s))
         if not own:
             self._native.exchange(drops)
         return self._shaped(commands, wanted)
@@ -179,7 +179,7 @@ class Shield:
         """
         rows = 1 if self.index is not None else self._native.count
         given = self._each(rows, {"positions": positions, "velocities": velocities})
-        return self._shaped(self._native.brake(*given, _times(elapsed_s, age_s)), positions)
+        return self._shaped(self._native.brake(given[0], given[1], _times(elapsed_s, age_s)), positions)
 
     def messages(self) -> list[tuple[int, bytes]]:
         """Takes the messages to send after ``filter``: receivers, counted from 0, and 64 bytes each.
