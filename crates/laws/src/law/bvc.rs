@@ -5,9 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::certificate::{Certificate, VoidReason};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
-use super::interface::LawContext;
-use super::interface::ReferenceUse;
-use super::interface::{Capabilities, Law, RateQuery, Rates};
+use super::interface::{Capabilities, Law, LawContext, RateQuery, Rates};
+use super::velocity_tracking::VelocityTracking;
 use crate::formation::Formation;
 use crate::observation::Observation;
 use crate::space::NearLists;
@@ -68,15 +67,13 @@ impl Default for BvcKeys {
 #[derive(Clone, Debug)]
 pub struct BvcLaw {
     keys: BvcKeys,
-    reference_use: ReferenceUse,
+    tracking: VelocityTracking,
     count: usize,
     delta_m: f64,
     /// D \[m\].
     diameter_m: f64,
-    a22_per_s: f64,
     /// Largest distance of the target point from the vehicle \[m\].
     reach_m: f64,
-    range_m: f64,
     near: NearLists,
     half_spaces: HalfSpaces,
 }
@@ -88,7 +85,7 @@ impl BvcLaw {
     /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
     /// some vehicle does not know the reference.
     pub fn new(context: &LawContext<'_>, keys: BvcKeys) -> Result<Self, ParameterError> {
-        let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
+        let &LawContext { links, formation, delta_m, .. } = context;
         let gains = [
             ("k_per_s", keys.k_per_s),
             ("speed_m_s", keys.speed_m_s),
@@ -99,16 +96,17 @@ impl BvcLaw {
         ParameterError::check(links, formation, &gains)?;
         let diameter_m = delta_m + keys.margin_m.unwrap_or(MARGIN * delta_m);
         let reach_m = keys.speed_m_s / keys.k_per_s;
+        let rates = [keys.k_per_s, keys.tracking_per_s];
+        // The half-space of a vehicle at this distance contains the ball of all target points.
+        let range_m = diameter_m + 2.0 * reach_m;
+        let tracking = VelocityTracking::new(context, rates, keys.max_accel_m_s2, range_m)?;
         Ok(Self {
             keys,
-            reference_use: ReferenceUse::new(context)?,
+            tracking,
             count: links.count(),
             delta_m,
             diameter_m,
-            a22_per_s,
             reach_m,
-            // The half-space of a vehicle at this distance contains the ball of all target points.
-            range_m: diameter_m + 2.0 * reach_m,
             near: NearLists::default(),
             half_spaces: HalfSpaces::default(),
         })
@@ -143,7 +141,7 @@ impl BvcLaw {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
         }
         let offset = 0.5 * (self.diameter_m - distance_m);
-        Ok((distance_m <= self.range_m).then(|| HalfSpace { normal: apart_m / distance_m, offset }))
+        Ok((distance_m <= self.tracking.range_m).then(|| HalfSpace { normal: apart_m / distance_m, offset }))
     }
 }
 
@@ -154,14 +152,7 @@ impl Law for BvcLaw {
 
     fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         self.velocities(observation, command)?;
-        let feed_forward_m_s2 = self.reference_use.feed_forward_m_s2(&observation.target.reference);
-        for i in 0..self.count {
-            let own_m_s = row(&observation.own.velocities_m_s, i);
-            let tracked_m_s2 = (row(command, i) - own_m_s) * self.keys.tracking_per_s;
-            let wanted = feed_forward_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
-            set_row(command, i, wanted.cap_magnitude(self.keys.max_accel_m_s2));
-        }
-        check_range(command)
+        self.tracking.command(observation, command)
     }
 
     fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
@@ -169,20 +160,12 @@ impl Law for BvcLaw {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            max_command_m_s2: Some(self.keys.max_accel_m_s2),
-            sensing_range_m: Some(self.range_m),
-            ..self.reference_use.capabilities()
-        }
+        self.tracking.capabilities()
     }
 
-    /// A vehicle without neighbours follows x'' = -tracking (x' + k x). With neighbours in range no bound is known: a
-    /// corner of the cell may move faster than its planes. a22 is compensated, so the common mode does not grow.
+    /// With neighbours in range no bound is known: a corner of the cell may move faster than its planes.
     fn rates(&self, query: &RateQuery) -> Rates {
-        let BvcKeys { tracking_per_s, k_per_s, .. } = self.keys;
-        let alone_per_s = tracking_per_s.max((tracking_per_s * k_per_s).sqrt());
-        let is_alone = query.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
-        Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(query) }
+        self.tracking.rates(query)
     }
 }
 

@@ -23,6 +23,7 @@ mod pinned;
 mod potential;
 mod spec;
 mod tension;
+mod velocity_tracking;
 
 pub use bvc::{BvcKeys, BvcLaw};
 pub use cbf_qp::{CbfQpKeys, CbfQpLaw, CbfQpVariant};

@@ -7,9 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::certificate::{Certificate, VoidReason};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
-use super::interface::LawContext;
-use super::interface::ReferenceUse;
-use super::interface::{Capabilities, Law, RateQuery, Rates};
+use super::interface::{Capabilities, Law, LawContext, RateQuery, Rates};
+use super::velocity_tracking::VelocityTracking;
 use crate::formation::Formation;
 use crate::observation::Observation;
 use crate::space::NearLists;
@@ -100,13 +99,11 @@ impl Default for OrcaKeys {
 #[derive(Clone, Debug)]
 pub struct OrcaLaw {
     keys: OrcaKeys,
-    reference_use: ReferenceUse,
+    tracking: VelocityTracking,
     count: usize,
     delta_m: f64,
     /// D \[m\].
     diameter_m: f64,
-    a22_per_s: f64,
-    range_m: f64,
     near: NearLists,
     /// Scratch: squared distances \[m^2\] and indices of the nearest near vehicles, at most `neighbours_max`.
     nearest: Vec<(f64, usize)>,
@@ -120,7 +117,7 @@ impl OrcaLaw {
     /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
     /// some vehicle does not know the reference.
     pub fn new(context: &LawContext<'_>, keys: OrcaKeys) -> Result<Self, ParameterError> {
-        let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
+        let &LawContext { links, formation, delta_m, .. } = context;
         let gains = [
             ("k_per_s", keys.k_per_s),
             ("speed_m_s", keys.speed_m_s),
@@ -134,14 +131,14 @@ impl OrcaLaw {
         ParameterError::check(links, formation, &gains)?;
         let diameter_m = delta_m + keys.margin_m.unwrap_or(MARGIN * delta_m);
         let range_m = keys.range_m.unwrap_or(diameter_m + 2.0 * keys.max_speed_m_s * keys.horizon_s);
+        let rates = [keys.k_per_s, keys.tracking_per_s];
+        let tracking = VelocityTracking::new(context, rates, keys.max_accel_m_s2, range_m)?;
         Ok(Self {
             keys,
-            reference_use: ReferenceUse::new(context)?,
+            tracking,
             count: links.count(),
             delta_m,
             diameter_m,
-            a22_per_s,
-            range_m,
             near: NearLists::default(),
             nearest: Vec::new(),
             half_spaces: HalfSpaces::default(),
@@ -182,7 +179,7 @@ impl OrcaLaw {
         let own_m = row(&observation.own.positions_m, i);
         for &j in self.near.of(i) {
             let apart = (observation.sensed(i, j).position_m - own_m).norm_squared();
-            if apart > self.range_m * self.range_m {
+            if apart > self.tracking.range_m * self.tracking.range_m {
                 continue;
             }
             let place = self.nearest.partition_point(|&(nearer, _)| nearer <= apart);
@@ -215,14 +212,7 @@ impl Law for OrcaLaw {
 
     fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         self.velocities(observation, command)?;
-        let feed_forward_m_s2 = self.reference_use.feed_forward_m_s2(&observation.target.reference);
-        for i in 0..self.count {
-            let own_m_s = row(&observation.own.velocities_m_s, i);
-            let tracked_m_s2 = (row(command, i) - own_m_s) * self.keys.tracking_per_s;
-            let wanted = feed_forward_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
-            set_row(command, i, wanted.cap_magnitude(self.keys.max_accel_m_s2));
-        }
-        check_range(command)
+        self.tracking.command(observation, command)
     }
 
     fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
@@ -230,20 +220,12 @@ impl Law for OrcaLaw {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            max_command_m_s2: Some(self.keys.max_accel_m_s2),
-            sensing_range_m: Some(self.range_m),
-            ..self.reference_use.capabilities()
-        }
+        self.tracking.capabilities()
     }
 
-    /// A vehicle without neighbours follows x'' = -tracking (x' + k x). With neighbours in range no bound is known: the
-    /// chosen velocity may turn as fast as two vehicles pass. a22 is compensated, so the common mode does not grow.
+    /// With neighbours in range no bound is known: the chosen velocity may turn as fast as two vehicles pass.
     fn rates(&self, query: &RateQuery) -> Rates {
-        let OrcaKeys { tracking_per_s, k_per_s, .. } = self.keys;
-        let alone_per_s = tracking_per_s.max((tracking_per_s * k_per_s).sqrt());
-        let is_alone = query.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
-        Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(query) }
+        self.tracking.rates(query)
     }
 }
 

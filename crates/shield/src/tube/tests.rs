@@ -2,7 +2,7 @@ use super::*;
 use crate::tests::Random;
 
 /// Loop of the docs.
-const BASE: TrackerLoop = TrackerLoop {
+pub(super) const BASE: TrackerLoop = TrackerLoop {
     period_s: 0.05,
     tracker_per_s2: 4.0,
     tracker_per_s: 4.0,

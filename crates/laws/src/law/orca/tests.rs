@@ -26,7 +26,7 @@ fn law(formation: &Formation, keys: OrcaKeys) -> OrcaLaw {
 /// Returns the chosen velocities and the commanded accelerations.
 fn answer(law: &mut OrcaLaw, swarm: &Swarm, formation: &Formation) -> Result<(Rows, Rows), LawError> {
     let (links, mut near) = (Graph::complete(swarm.count()), CellList::default());
-    near.update(&swarm.positions_m, law.range_m);
+    near.update(&swarm.positions_m, law.tracking.range_m);
     let observation = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, formation) };
     let (mut velocities, mut command) = (Rows::zeros(swarm.count()), Rows::zeros(swarm.count()));
     law.velocities(&observation, &mut velocities)?;

@@ -1,19 +1,6 @@
 use super::*;
 use crate::tests::Random;
-
-/// Loop of the docs.
-const BASE: TrackerLoop = TrackerLoop {
-    period_s: 0.05,
-    tracker_per_s2: 4.0,
-    tracker_per_s: 4.0,
-    position_error_m: 0.03,
-    velocity_error_m_s: 0.05,
-    disturbance_m_s2: 0.3,
-    a22_per_s: 0.0,
-    accel_m_s2: 5.0,
-    measurement_delay_periods: 0,
-    actuator_lag_s: 0.0,
-};
+use crate::tube::tests::BASE;
 
 fn times(shortest_s: f64, longest_s: f64) -> Intervals {
     Intervals { shortest_s, longest_s, jumps: [0.0; 2] }
