@@ -64,6 +64,13 @@ impl SavedShield {
                 "give unaltered data",
             ));
         }
+        // A shield without the commands since the oldest measurement would leave out the feedback.
+        let legs = (limits.most_legs() as u64).min(self.period.saturating_sub(1));
+        if self.legs.len() as u64 != legs {
+            let problem = format!("the saved state has another number of commands than the {legs} that a shield saves");
+            let (found, remedy) = (self.legs.len() as f64, "give unaltered data");
+            return Err(ShieldError::new(ShieldFault::Altered, "saved", problem, found, remedy));
+        }
         Shield::loaded(self, &limits, &starts)
     }
 }

@@ -41,6 +41,7 @@ use crate::brake::{Brake, State};
 use crate::choice::{Choice, Envelope};
 use crate::contract::Side;
 use crate::plane::{Metric, Segment};
+use crate::report::TIME_ROUNDING;
 use crate::start::Start;
 use crate::tube::{
     Intervals, LARGEST_DRAG, TrackerLoop, Tube, TubeError, largest_drag_per_s, longest_period_s, shortest_lag_s,
@@ -585,6 +586,19 @@ impl Limits {
     #[must_use]
     pub fn times_s(&self) -> [f64; 2] {
         self.settings.times_s()
+    }
+
+    /// Number of the last commands that a shield keeps to predict its state from a measurement; 0 for new measurements.
+    pub(crate) fn most_legs(&self) -> usize {
+        let oldest_s = self.settings.measurement_age_s * TIME_ROUNDING;
+        if oldest_s == 0.0 {
+            return 0;
+        }
+        // One more than the oldest measurement can need, because ages and times have rounding. At most 20 periods of at
+        // least half of the period.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let whole = (oldest_s / self.times_s()[0]).floor() as usize;
+        whole + 1
     }
 
     /// Brake of the reference.

@@ -97,8 +97,6 @@ pub struct Shield {
     past: VecDeque<State>,
     /// Commands up to this instant, oldest first, for measurements with a known age, and the command since.
     legs: VecDeque<Leg>,
-    /// Largest number of legs within the largest age.
-    most_legs: usize,
     held: Vector3<f64>,
     contracts: Contracts,
     /// Rooms of planes that need not be looked at, at the largest speed.
@@ -143,7 +141,7 @@ impl Shield {
         (shield.reference, shield.acceleration) = (saved.reference, saved.acceleration);
         (shield.next, shield.segment) = (saved.next, saved.segment);
         shield.past.extend(&saved.past);
-        shield.legs.extend(saved.legs.iter().take(shield.most_legs));
+        shield.legs.extend(&saved.legs);
         shield.held = saved.held.into();
         shield.counters = saved.counters;
         Ok(shield)
@@ -165,7 +163,7 @@ impl Shield {
             segment: self.segment,
             past: self.past.iter().copied().collect(),
             legs: self.legs.iter().copied().collect(),
-            held: if self.most_legs > 0 { self.held.into() } else { [0.0; 3] },
+            held: if self.limits.most_legs() > 0 { self.held.into() } else { [0.0; 3] },
             contracts: self.contracts.save(),
             counters: self.counters,
         })
@@ -176,11 +174,6 @@ impl Shield {
         let contracts = Contracts::new(index, Arc::clone(starts))?;
         // The index is in the list.
         let own = &starts[index];
-        // One more than the oldest measurement can need, because ages and times have rounding. At most 20 periods of at
-        // least half of the period.
-        let oldest_s = limits.settings().measurement_age_s * TIME_ROUNDING;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let most_legs = if oldest_s > 0.0 { (oldest_s / limits.times_s()[0]).floor() as usize + 1 } else { 0 };
         Ok(Self {
             limits: *limits,
             period: 0,
@@ -189,8 +182,7 @@ impl Shield {
             next: own.state,
             segment: own.segment,
             past: VecDeque::with_capacity(limits.settings().measurement_delay_periods + 1),
-            legs: VecDeque::with_capacity(most_legs),
-            most_legs,
+            legs: VecDeque::with_capacity(limits.most_legs()),
             held: Vector3::zeros(),
             contracts,
             fastest: limits.horizon(limits.settings().max_speed_m_s),
@@ -332,8 +324,9 @@ impl Shield {
             }
             self.counters.aged(timing.age_s, self.limits.settings().measurement_age_s);
         }
-        if self.period > 0 && self.most_legs > 0 {
-            if self.legs.len() == self.most_legs {
+        let most_legs = self.limits.most_legs();
+        if self.period > 0 && most_legs > 0 {
+            if self.legs.len() == most_legs {
                 self.legs.pop_front();
             }
             self.legs.push_back(Leg { command: self.held, seconds: elapsed_s });
