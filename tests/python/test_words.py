@@ -9,10 +9,10 @@ import tautline as tl
 from shared import ROOT, Case, passing, short
 from tautline import _arguments, _audit, _native, _words
 
-#: Options of commands that the package does not have: watches, pictures, films, replays, proofs.
+#: Options of commands that the package does not have: watches, pictures, films, replays, proofs, logs of contracts.
 FOREIGN = {
-    "accel", "adapter", "bad", "brake", "expect", "film", "film_fps", "horizon", "identify", "json", "latency",
-    "max_age", "max_vehicles", "position_error", "proof", "run", "shard", "size", "velocity_error",
+    "accel", "adapter", "bad", "brake", "contract_log", "expect", "film", "film_fps", "horizon", "identify", "json",
+    "latency", "max_age", "max_vehicles", "position_error", "proof", "run", "shard", "size", "velocity_error",
 }  # fmt: skip
 
 

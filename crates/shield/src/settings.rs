@@ -439,7 +439,7 @@ impl Settings {
             let value = self.hang_periods as f64;
             return fails("hang_periods", "must be at most 20 periods", value, "use a longer period");
         }
-        let is_irregular = self.period_tolerance > 0.0 || self.hang_periods > 0;
+        let is_irregular = self.intervals().is_some();
         if self.measurement_delay_periods > 0 && (is_irregular || self.measurement_age_s > 0.0) {
             let problem = "must be 0 with `period_tolerance`, `hang_periods` or `measurement_age_s`";
             let value = self.measurement_delay_periods as f64;
