@@ -293,6 +293,7 @@ mod tests {
     use super::*;
     use crate::brake::State;
     use crate::settings::Settings;
+    use crate::shield::Timing;
 
     /// Bytes that a log wrote.
     #[derive(Clone, Default)]
@@ -371,6 +372,27 @@ mod tests {
             }
         });
         assert!(text.contains("\nforeign 1 0\n"));
+    }
+
+    #[test]
+    fn a_reference_that_did_not_move_by_the_period_is_named() {
+        let settings = Settings { period_tolerance: 0.2, ..Settings::new(1.0, 0.05) };
+        let limits = settings.limits().expect("a tube");
+        let states = [-3.0, 3.0].map(|x| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::y() });
+        for (elapsed_s, moved) in [(0.05, 0), (0.04, 1), (0.06, 1)] {
+            let mut fleet = Fleet::new(&[limits; 2], &states).expect("apart");
+            let written = Written::default();
+            let mut log = ContractLog::new(Box::new(written.clone()));
+            log.begin(&fleet);
+            for _ in 0..2 {
+                let shield = &mut fleet.shields_mut()[0];
+                shield.filter_timed(states[0], Vector3::zeros(), Timing { elapsed_s, age_s: 0.0 });
+                log.filtered(shield);
+            }
+            log.finish().expect("written");
+            let text = String::from_utf8(written.0.lock().expect("no panic").clone()).expect("text");
+            assert_eq!(text.matches("\nmoved 0\n").count(), moved, "{elapsed_s}");
+        }
     }
 
     #[test]

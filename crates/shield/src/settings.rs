@@ -978,6 +978,13 @@ mod tests {
         let wider = Settings { position_error_m: errors[0], velocity_error_m_s: errors[1], ..base };
         assert!((tube(old).error_m - tube(wider).error_m).abs() < 1e-9);
         assert!(old.limits().expect("certified").certificate().contains("at most 0.1 s old, with known ages"));
+        // With a22 > 0 an error grows until the instant. At most three instants, 0.04 s apart, are within 0.1 s.
+        let growing = Settings { a22_per_s: 0.5, period_tolerance: 0.2, elapsed_error_s: 0.01, ..old };
+        let growth = 0.05_f64.exp();
+        let switched = 5.0 * 0.01 * 3.0 * 4.0;
+        let errors =
+            [0.03 + growth * (0.05 * 0.1 + 0.3 * 0.005 + switched * 0.1), growth * (0.05 + 0.3 * 0.1 + switched)];
+        assert!(growing.predicted_errors().into_iter().zip(errors).all(|(found, error)| (found - error).abs() < 1e-9));
         // An unknown period costs what the reference may jump.
         let unknown = tube(Settings { period_tolerance: 0.1, elapsed_error_s: 0.005, ..base });
         assert!(unknown.error_m > regular.error_m + 0.1, "{unknown:?}");

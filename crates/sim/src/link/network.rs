@@ -44,6 +44,11 @@ pub struct NetworkSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub range_m: Option<f64>,
+    /// Largest number of hops of a message: vehicles pass on the messages of others. Latency, jitter and loss apply to
+    /// each hop. No relay unless given. Needs `rate_hz`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 1, "maximum" = 64))]
+    pub relay_hops: Option<u32>,
     /// Estimate of the present state of another vehicle from its last message.
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = StalePolicy::default()))]
@@ -95,6 +100,12 @@ pub struct LinkFailure {
 }
 
 impl NetworkSpec {
+    /// Returns the largest number of hops of a message.
+    #[must_use]
+    pub fn hops(&self) -> u32 {
+        self.relay_hops.unwrap_or(1)
+    }
+
     /// Returns whether messages may be lost.
     #[must_use]
     pub fn loses(&self) -> bool {
@@ -104,8 +115,8 @@ impl NetworkSpec {
 
 impl ImperfectionSpec for NetworkSpec {
     fn is_exact(&self) -> bool {
-        Self { missing: StalePolicy::Hold, near: NearStates::Sensed, loss_burst: None, ..self.clone() }
-            == Self::default()
+        let (missing, near) = (StalePolicy::Hold, NearStates::Sensed);
+        Self { missing, near, loss_burst: None, relay_hops: None, ..self.clone() } == Self::default()
     }
 
     fn is_random(&self) -> bool {
@@ -117,6 +128,10 @@ impl ImperfectionSpec for NetworkSpec {
         latency("network.latency_s", "the latency of messages", latency_s, scenario.time.duration_s)?;
         latency("network.jitter_s", "the jitter of messages", jitter_s, scenario.time.duration_s)?;
         check_loss(loss, loss_burst)?;
+        if let Some(hops) = self.relay_hops.filter(|hops| !(1..=MOST_HOPS).contains(hops)) {
+            let problem = format!("a message takes 1 to {MOST_HOPS} hops, got {hops}");
+            return Err(ErrorKind::OutOfRange.at(&["network.relay_hops"], problem, "leave it out for no relay"));
+        }
         if rate_hz.is_some() {
             scenario.check_sampled("network.rate_hz")?;
         }
@@ -124,6 +139,7 @@ impl ImperfectionSpec for NetworkSpec {
             ("network.jitter_s", jitter_s > 0.0),
             ("network.loss", loss > 0.0),
             ("network.range_m", self.range_m.is_some()),
+            ("network.relay_hops", self.relay_hops.is_some()),
             ("network.failure", !self.failure.is_empty()),
         ];
         for (key, _) in needs_rate.into_iter().filter(|&(_, is_used)| is_used) {
@@ -140,6 +156,8 @@ impl ImperfectionSpec for NetworkSpec {
     }
 }
 
+/// Largest number of hops of a message.
+const MOST_HOPS: u32 = 64;
 /// Largest number of messages that a vehicle sends in a step.
 const MESSAGES_A_STEP: f64 = 10.0;
 /// Expected memory of a link in one direction, for its last message \[bytes\].
@@ -210,7 +228,8 @@ impl Scenario {
         let pairs = count * count.saturating_sub(1);
         let received =
             if self.network.near == NearStates::Received { pairs } else { 2 * self.graph.edge_count() as u128 };
-        let under_way = ((self.network.latency_s + self.network.jitter_s) * rate_hz).ceil() + 2.0;
+        let longest_s = (self.network.latency_s + self.network.jitter_s) * f64::from(self.network.hops());
+        let under_way = (longest_s * rate_hz).ceil() + 2.0;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "more than 2; too many saturate")]
         let bytes = received.saturating_mul(BYTES_PER_LINK + BYTES_PER_MESSAGE * under_way as u128);
         if bytes <= MAX_MEMORY_BYTES {

@@ -59,6 +59,8 @@ pub(crate) struct Radio<T> {
     jitter_s: f64,
     /// Range \[m\]; infinite without a limit.
     range_m: f64,
+    /// Hops of messages, if vehicles pass on those of others.
+    relay: Option<Relay>,
     loss: Option<Loss>,
     noise: Noise,
     used_for: RadioUse,
@@ -81,7 +83,7 @@ impl<T> Radio<T> {
     /// Returns the radio of a scenario with this number of directed links.
     pub(crate) fn new(scenario: &Scenario, links: usize, used_for: RadioUse) -> Self {
         let NetworkSpec { latency_s, jitter_s, loss, loss_burst, range_m, .. } = scenario.network;
-        let count = scenario.count();
+        let (count, hops) = (scenario.count(), scenario.network.hops());
         let index = |number: u64| usize::try_from(number.saturating_sub(1)).unwrap_or(usize::MAX);
         let down = scenario.network.failure.iter().map(|failure| LinkOutage {
             ends: failure.link.map(index),
@@ -96,6 +98,7 @@ impl<T> Radio<T> {
             latency_s,
             jitter_s,
             range_m: range_m.unwrap_or(f64::INFINITY),
+            relay: (hops > 1).then(|| Relay::new(hops, count)),
             loss: (loss > 0.0).then(|| Loss::new(loss, loss_burst)),
             noise: Noise::new(scenario.noise_seed, NoiseSource::Messages),
             used_for,
@@ -151,24 +154,46 @@ impl<T> Radio<T> {
             arrives_s.extend(links.map(|_| f64::INFINITY));
             return;
         }
+        let mut relay = self.relay.take();
+        if let Some(relay) = &mut relay {
+            relay.count_hops(sender, |from, to| self.is_linked((from, to), sent_s, positions_m));
+        }
         let is_random = self.loss.is_some() || self.jitter_s > 0.0;
-        let mut draw =
-            is_random.then(|| self.noise.draw(sender, self.used_for as usize, self.rounds + 1, DRAWS * most));
+        let draws = DRAWS * most * relay.as_ref().map_or(1, |relay| relay.most as usize);
+        let mut draw = is_random.then(|| self.noise.draw(sender, self.used_for as usize, self.rounds + 1, draws));
         for (link, receiver) in links {
-            let [unit, jitter] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
-            let by_chance = self.loss.is_some_and(|loss| {
-                let is_lost = loss.next(self.lost_before[link], unit);
-                self.lost_before[link] = Some(is_lost);
-                is_lost
-            });
-            let is_beyond = self.range_m < f64::INFINITY
-                && (row(positions_m, receiver) - row(positions_m, sender)).norm() > self.range_m;
-            let is_lost = by_chance || is_beyond || self.down.iter().any(|down| down.blocks(sender, receiver, sent_s));
+            // A message without a path is lost at its first hop.
+            let hops = relay.as_ref().map_or(1, |relay| relay.hops[receiver].max(1));
+            let (mut by_chance, mut jitters) = (false, 0.0);
+            for _ in 0..hops {
+                let [unit, jitter] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
+                by_chance |= self.loss.is_some_and(|loss| {
+                    let is_lost = loss.next(self.lost_before[link], unit);
+                    self.lost_before[link] = Some(is_lost);
+                    is_lost
+                });
+                jitters += jitter;
+            }
+            let is_reached = match &relay {
+                Some(relay) => relay.hops[receiver] > 0,
+                None => self.is_linked((sender, receiver), sent_s, positions_m),
+            };
+            let is_lost = by_chance || !is_reached;
             self.sent += 1;
             self.lost += u64::from(is_lost);
-            let arrival_s = (sent_s + self.latency_s + self.jitter_s * jitter).max(sent_s + self.used_for.shortest_s());
+            let arrival_s = sent_s + self.latency_s * f64::from(hops) + self.jitter_s * jitters;
+            let arrival_s = arrival_s.max(sent_s + self.used_for.shortest_s());
             arrives_s.push(if is_lost { f64::INFINITY } else { arrival_s });
         }
+        self.relay = relay;
+    }
+
+    /// Whether a message reaches a vehicle in one hop, if it is not lost by chance.
+    fn is_linked(&self, (sender, receiver): (usize, usize), sent_s: f64, positions_m: &Rows) -> bool {
+        let is_within = self.range_m == f64::INFINITY
+            || (row(positions_m, receiver) - row(positions_m, sender)).norm() <= self.range_m;
+        let is_silent = sent_s + SAME_S >= self.silent_from_s[sender];
+        is_within && !is_silent && !self.down.iter().any(|down| down.blocks(sender, receiver, sent_s))
     }
 
     /// Ends a round, whose messages were sent at a time \[s\].
@@ -185,9 +210,46 @@ impl<T> Radio<T> {
             deliver(round, &mut round.arrives_s.iter().map(|arrives_s| *arrives_s > from_s && *arrives_s <= to_s));
         }
         self.delivered_s = to_s;
-        let longest_s = (self.latency_s + self.jitter_s).max(self.used_for.shortest_s());
+        let hops = self.relay.as_ref().map_or(1, |relay| relay.most);
+        let longest_s = ((self.latency_s + self.jitter_s) * f64::from(hops)).max(self.used_for.shortest_s());
         while let Some(round) = self.under_way.pop_front_if(|first| first.sent_s + longest_s <= to_s) {
             self.recycle(round);
+        }
+    }
+}
+
+/// Relay of messages: each vehicle passes on a message that it receives first, up to a number of hops.
+#[derive(Clone, Debug)]
+struct Relay {
+    most: u32,
+    /// Smallest number of hops from the present sender to each vehicle; 0 for the sender, and without a path.
+    hops: Vec<u32>,
+    /// Vehicles that a message reached, in the order of their hops.
+    reached: Vec<usize>,
+}
+
+impl Relay {
+    fn new(most: u32, count: usize) -> Self {
+        Self { most, hops: vec![0; count], reached: Vec::with_capacity(count) }
+    }
+
+    /// Counts the hops of a message from a sender, while the vehicles stay where they are.
+    fn count_hops(&mut self, sender: usize, is_linked: impl Fn(usize, usize) -> bool) {
+        self.hops.fill(0);
+        self.reached.clear();
+        self.reached.push(sender);
+        let mut next = 0;
+        while let Some(&from) = self.reached.get(next) {
+            next += 1;
+            if self.hops[from] == self.most {
+                break;
+            }
+            for to in 0..self.hops.len() {
+                if to != sender && self.hops[to] == 0 && is_linked(from, to) {
+                    self.hops[to] = self.hops[from] + 1;
+                    self.reached.push(to);
+                }
+            }
         }
     }
 }
@@ -232,6 +294,20 @@ impl Loss {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn messages_take_the_fewest_hops_up_to_their_largest_number() {
+        // Vehicles on a line, and one apart from it.
+        let neighbours = |from: usize, to: usize| from < 5 && to < 5 && from.abs_diff(to) == 1;
+        let mut relay = Relay::new(3, 6);
+        relay.count_hops(1, neighbours);
+        assert_eq!(relay.hops, [1, 0, 1, 2, 3, 0]);
+        relay.count_hops(0, neighbours);
+        assert_eq!(relay.hops, [0, 1, 2, 3, 0, 0]);
+        // A vehicle that passes on nothing ends the path.
+        relay.count_hops(1, |from, to| from != 2 && neighbours(from, to));
+        assert_eq!(relay.hops, [1, 0, 1, 0, 0, 0]);
+    }
 
     /// Returns the share of lost messages and the mean length of a burst on a link.
     fn measured(loss: Loss, messages: u64) -> (f64, f64) {

@@ -15,7 +15,6 @@ use super::spec::{Safety, Scenario, Space};
 use super::start;
 use super::time::bounded_record_hz;
 use super::vehicle::{QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
-use crate::shield::SHIELD_CONTROL_HZ;
 use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, set_row};
 
@@ -57,9 +56,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         time.control_hz = time.control_hz.or(Some(QUADROTOR_CONTROL_HZ));
     }
     let shield = document.shield.filter(|shield| shield.enabled);
-    if shield.is_some() {
-        time.control_hz = time.control_hz.or(Some(SHIELD_CONTROL_HZ));
-    }
+    let chooses_rate = shield.is_some() && time.control_hz.is_none();
     let mut scenario = Scenario {
         start,
         mass_kg: per_vehicle(mass_kg, count),
@@ -90,6 +87,9 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         safety,
     };
     legs(&mut scenario, &document.formation, &document.leg)?;
+    if chooses_rate {
+        scenario.choose_shield_rate();
+    }
     if !gives_step {
         scenario.choose_step();
     }

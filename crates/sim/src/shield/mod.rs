@@ -45,7 +45,11 @@ use tautline_shield::obstacle::ConvexBody;
 use tautline_shield::{Fleet, Limits, Obstacle, Settings, ShieldError, Start, State};
 
 /// Default rate of held commands under a shield \[Hz\].
-pub(crate) const SHIELD_CONTROL_HZ: f64 = 20.0;
+const SHIELD_CONTROL_HZ: f64 = 20.0;
+/// Number of steps in a period of 20 Hz beyond which no other rate is chosen.
+const MOST_STEPS: f64 = 1e4;
+/// Share of the longest stable period of the law that the default rate uses at most.
+const PERIOD_SHARE: f64 = 0.5;
 /// Default of the largest command and of the largest speed, without limits in other tables.
 const ACCEL_M_S2: f64 = 5.0;
 const SPEED_M_S: f64 = 2.0;
@@ -59,8 +63,9 @@ const BYTES_PER_CONTRACT: u128 = 256;
 const BYTES_PER_MESSAGE: u128 = 64;
 
 /// Shield: changes commands of the law only where this is needed to certify that no two vehicles come closer than
-/// `law.delta_m`. Commands are held over the periods of `time.control_hz`, 20 Hz unless given. Messages of the shield
-/// use the latency, loss and rate of `[network]`, between vehicles near their common plane.
+/// `law.delta_m`. Commands are held over the periods of `time.control_hz`; unless given 20 Hz, or a multiple of it that
+/// the law needs to be stable near its slots. Messages of the shield use the latency, loss and rate of `[network]`,
+/// between vehicles near their common plane.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShieldSpec {
@@ -179,6 +184,24 @@ impl Scenario {
             return Err(refused(&["shield.accel_m_s2", "actuation.max_accel_m_s2"], problem, accel_m_s2, &help));
         }
         settings.limits().map(Some).map_err(|error| self.of_shield(&error))
+    }
+
+    /// Sets the rate of held commands: 20 Hz, or the smallest multiple that the law needs near its slots.
+    ///
+    /// The period is at most half of the longest one at which the linearised law is stable, and a whole number of
+    /// steps. With `sensing.rate_hz` the rate is 20 Hz.
+    pub(crate) fn choose_shield_rate(&mut self) {
+        self.time.control_hz = Some(SHIELD_CONTROL_HZ);
+        let steps = 1.0 / (SHIELD_CONTROL_HZ * self.time.dt_s);
+        let is_free = self.airframe.is_point() && self.sensing.rate_hz.is_none() && is_whole(steps);
+        let Some(law) = self.law().ok().filter(|_| is_free && steps < MOST_STEPS) else { return };
+        let Some(linear) = law.linear(self.formation()) else { return };
+        let longest_s = PERIOD_SHARE * linear.sampling_margin_s(self.velocity_coefficient_per_s());
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1, below MOST_STEPS")]
+        let steps = steps.round() as u32;
+        let is_stable = |parts: &u32| 1.0 <= longest_s * SHIELD_CONTROL_HZ * f64::from(*parts);
+        let parts = (1..=steps).filter(|parts| steps.is_multiple_of(*parts)).find(is_stable);
+        self.time.control_hz = parts.map(|parts| SHIELD_CONTROL_HZ * f64::from(parts)).or(self.time.control_hz);
     }
 
     /// Returns the settings of a table of the shield at a rate of commands \[Hz\].

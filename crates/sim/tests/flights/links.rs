@@ -150,6 +150,50 @@ fn broken_links_and_silent_vehicles_leave_the_last_message() {
 }
 
 #[test]
+fn vehicles_pass_on_messages_up_to_the_largest_number_of_hops() {
+    let mut scenario = scenario();
+    scenario.graph = Graph::complete(COUNT);
+    (scenario.network.rate_hz, scenario.network.latency_s) = (Some(100.0), 0.02);
+    // Vehicles are 10 m apart on a line.
+    scenario.network.range_m = Some(10.5);
+    let known_s = |scenario: &Scenario, receiver: usize, time_s: f64| {
+        let mut link = of(scenario, true);
+        let mut known_s = f64::NAN;
+        let last = (time_s / DT_S).round() as u32;
+        after(link.as_mut(), 0..=last, |time_s, sensed| {
+            known_s = time_s - picture(&sensed).received(receiver, 0).age_s;
+        });
+        known_s
+    };
+    for (relay_hops, reached) in [(None, 1), (Some(1), 1), (Some(2), 2), (Some(3), 3), (Some(64), 3)] {
+        scenario.network.relay_hops = relay_hops;
+        for receiver in 1..COUNT {
+            // One latency for each hop, or the start.
+            let expected_s = if receiver <= reached { 0.5 - 0.02 * receiver as f64 } else { 0.0 };
+            let found_s = known_s(&scenario, receiver, 0.5);
+            assert!((found_s - expected_s).abs() < 1e-9, "{relay_hops:?} {receiver}: {found_s}");
+        }
+    }
+    // A message under way does not go on through a link that is down, or a vehicle that is silent.
+    scenario.network.relay_hops = Some(3);
+    scenario.failures = vec![Failure { vehicle: 3, at_s: 0.3, kind: FailureKind::Silent {} }];
+    assert!((known_s(&scenario, 3, 0.5) - 0.29).abs() < 1e-9);
+    assert!((known_s(&scenario, 2, 0.5) - 0.46).abs() < 1e-9);
+    scenario.network.failure = vec![LinkFailure { link: [1, 2], from_s: 0.1, to_s: Some(0.4) }];
+    assert!((known_s(&scenario, 2, 0.3) - 0.09).abs() < 1e-9);
+    // Each hop may lose the message.
+    (scenario.failures, scenario.network.failure) = (vec![], vec![]);
+    scenario.network.loss = 0.2;
+    let mut link = of(&scenario, true);
+    after(link.as_mut(), 0..=2000, |_, _| {});
+    let traffic = link.traffic().expect("messages");
+    // Of the pairs, 6 have one hop, 4 have two, and 2 have three.
+    let expected = 1.0 - (6.0 * 0.8 + 4.0 * 0.8_f64.powi(2) + 2.0 * 0.8_f64.powi(3)) / 12.0;
+    let lost = traffic.lost as f64 / traffic.sent as f64;
+    assert!((lost - expected).abs() < 0.01, "{lost} {expected}");
+}
+
+#[test]
 fn errors_have_the_given_deviation_and_are_drawn_for_each_measurement() {
     let mut noisy = scenario();
     (noisy.sensing.position_noise_m, noisy.sensing.velocity_noise_m_s) = (0.1, 0.02);

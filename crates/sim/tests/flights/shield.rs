@@ -489,6 +489,18 @@ fn a_radio_of_any_range_keeps_vehicles_apart() {
     let short = with("range_m = 0.9");
     assert_eq!((short.audit.status, report(&short).lost), (Status::Clear, report(&short).sent));
     assert_eq!((report(&short).breach, report(&short).counters.accepted), (None, 0));
+    // A third vehicle passes on some of the messages that are out of range.
+    let text = text.replace("[-6, 0], [6, 0]]", "[-6, 0], [6, 0], [0, 3]]");
+    let text = text.replace("[[6, 0], [-6, 0]]", "[[6, 0], [-6, 0], [0, 3]]").replace("count = 2", "count = 3");
+    let relayed = |hops: u32| {
+        let network = format!("[network]\nrate_hz = 20\nrange_m = 5.0\nrelay_hops = {hops}");
+        fly(&read(&format!("{text}\n[shield]\n{network}"))).0
+    };
+    let (direct, relayed) = (relayed(1), relayed(2));
+    assert!(report(&relayed).lost < report(&direct).lost);
+    for flight in [&direct, &relayed] {
+        assert_eq!((flight.audit.status, report(flight).breach), (Status::Clear, None));
+    }
 }
 
 #[test]
@@ -497,4 +509,32 @@ fn a_lag_and_late_measurements_keep_the_bounds() {
         let (flight, _) = fly(&read(&format!("{SWAP}\n[shield]\n[actuation]\nlag_s = 0.05\n[sensing]\n{sensing}")));
         assert_eq!((flight.status(), report(&flight).breach), (Status::Clear, None), "{sensing}");
     }
+}
+
+#[test]
+fn the_default_period_is_one_that_the_law_tolerates() {
+    let lattice = |count: usize, more: &str| {
+        let text = format!(
+            "[swarm]\ncount = {count}\n[start]\nshape = \"grid\"\nspacing_m = 2.0\njitter_m = 0.05\n\
+             [formation]\nshape = \"grid\"\nspacing_m = 2.0\n[law]\nkind = \"displacement\"\ndelta_m = 1.0\n\
+             [reference]\nkind = \"rest\"\n[time]\nduration_s = 15\n{more}"
+        );
+        read(&text)
+    };
+    let rate_hz = |count: usize, more: &str| lattice(count, more).time.control_hz;
+    // The relative velocities of the complete graph with a reference have the damping (N + 1) c, here with c = 1 /s.
+    // Held commands need less than 2 s / (N + 1). The default takes at most half of this.
+    for (count, expected_hz) in [(4, 20.0), (19, 20.0), (20, 40.0), (39, 40.0), (40, 60.0), (100, 120.0)] {
+        let found_hz = rate_hz(count, "[shield]").expect("a rate");
+        assert!((found_hz - expected_hz).abs() < 1e-9, "{count}: {found_hz}");
+    }
+    assert_eq!(rate_hz(40, "control_hz = 20\n[shield]"), Some(20.0));
+    assert_eq!(rate_hz(40, "[sensing]\nrate_hz = 20\n[shield]"), Some(20.0));
+    assert_eq!(rate_hz(40, ""), None);
+    // No rate of whole steps is enough for such a law.
+    assert_eq!(rate_hz(40, "dt_s = 0.05\n[shield]"), Some(20.0));
+    // At the default rate, vehicles come to rest in their slots. At 20 Hz they go on shaking.
+    let [chosen, fixed] = ["[shield]", "control_hz = 20\n[shield]"].map(|more| fly(&lattice(60, more)).0);
+    let moved_m = |flight: &tautline_sim::sim::Flight| flight.last.velocities_m_s.amax();
+    assert!(moved_m(&chosen) < 1e-2 && moved_m(&fixed) > 0.1, "{} {}", moved_m(&chosen), moved_m(&fixed));
 }
