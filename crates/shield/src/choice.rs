@@ -21,6 +21,9 @@ const OPENING: f64 = 4.0;
 const OPENING_SHARE: f64 = 0.5;
 /// Share of the squared vertical cut above which a vehicle gives way to a side and not in the vertical.
 const LEVEL: f64 = 0.2;
+/// Share of the cut above which the rest of a wish before an obstacle is to one side. With a smaller share, a vehicle
+/// turns back before the end of a wall. Near 1 the turn to the right cancels the rest of the wish.
+const ASIDE: f64 = 0.6;
 /// Reach that is added because of rounding \[m\].
 const SLACK_M: f64 = 1e-6;
 
@@ -32,12 +35,13 @@ pub enum Choice {
     /// 1. Planes and the largest acceleration bound the command by half-spaces, to first order of the stop point.
     /// 2. Where the stop point is nearer to a plane than half the ease, the bound is lower and opens the gap.
     /// 3. What the projection cuts from the wish is added again, turned by a right angle. Vehicles that meet head-on
-    ///    therefore pass on the same side.
+    ///    therefore pass on the same side. Before obstacles alone, a wish that is clearly to the left is turned to the
+    ///    left. At a wall, a turn to the right would cancel it.
     /// 4. The command is on the line from the brake to this aim, as far as it is accepted.
     GiveWay {
         /// Gap that two vehicles keep by choice \[m\]; 0 for none.
         ease_m: f64,
-        /// Share of the cut that is turned to the right, from -1 (left) to 1; 0 for none.
+        /// Share of the cut that is turned to the right before vehicles, from -1 (left) to 1; 0 for none.
         turn: f64,
     },
     /// The accepted command on the line from the brake to the wish, nearest to the wish. Vehicles stop before each
@@ -118,6 +122,8 @@ fn cap(vector: Vector3<f64>, length: f64) -> Vector3<f64> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reach {
     planes: Vec<Plane>,
+    /// Number of planes before obstacles, which are the last ones.
+    obstacles: usize,
     hard: HalfSpaces,
     soft: HalfSpaces,
 }
@@ -127,6 +133,7 @@ impl Reach {
     pub(crate) fn with_capacity(count: usize) -> Self {
         Self {
             planes: Vec::with_capacity(count),
+            obstacles: 0,
             hard: HalfSpaces::with_capacity(count),
             soft: HalfSpaces::with_capacity(count),
         }
@@ -134,15 +141,20 @@ impl Reach {
 
     pub(crate) fn clear(&mut self) {
         self.planes.clear();
+        self.obstacles = 0;
     }
 
+    /// Adds a plane before another vehicle.
     #[inline]
     pub(crate) fn push(&mut self, plane: Plane) {
         self.planes.push(plane);
     }
 
-    pub(crate) fn extend(&mut self, planes: impl Iterator<Item = Plane>) {
+    /// Adds the planes before obstacles, after those before vehicles.
+    pub(crate) fn push_obstacles(&mut self, planes: impl Iterator<Item = Plane>) {
+        let vehicles = self.planes.len();
         self.planes.extend(planes);
+        self.obstacles = self.planes.len() - vehicles;
     }
 
     /// Whether a point is inside all planes.
@@ -227,29 +239,42 @@ impl Reach {
         let slower = (speed - brake.deceleration_m_s2() * envelope.period_s).max(0.0);
         let now = brake.glide_s(speed);
         [now, brake.glide_s(slower)].into_iter().find_map(|glide| {
-            self.bound(envelope, state, glide, now, ease_m);
+            let meets_vehicle = self.bound(envelope, state, wish, [glide, now], ease_m);
             let radius = envelope.accel_m_s2;
             let nearest = self.soft.nearest_inside(wish, radius).or_else(|| self.hard.nearest_inside(wish, radius))?;
             if turn == 0.0 {
                 return Some(nearest);
             }
-            let turned = nearest + right_hand(wish - nearest) * turn;
+            let right = right_hand(wish - nearest);
+            let is_aside = right.dot(&wish) * turn < -ASIDE * right.norm_squared();
+            let turn = if is_aside && !meets_vehicle { -turn } else { turn };
+            let turned = nearest + right * turn;
             self.hard.nearest_inside(envelope.cut(&state.velocity_m_s, turned), radius)
         })
     }
 
-    /// Sets the half-spaces `a . u <= r` of the command for the stop point at the glide time g:
+    /// Sets the half-spaces `a . u <= r` of the command for the stop point at the glide time g. Returns whether one
+    /// before a vehicle cuts the wish.
     ///
     /// ```text
     /// hard   r = min( (b - a.p - a.v h) / (h^2/2), (b - a.p - a.v (h + g)) / (h^2/2 + h g) )
     /// soft   min( r, max( -4 (ease/2 - R) - 4 max(a.v, 0), -A/2 ) )   where the room R of the stop point is < ease/2
     /// ```
-    fn bound(&mut self, envelope: &Envelope, state: &State, glide: f64, glide_now: f64, ease_m: f64) {
+    fn bound(
+        &mut self,
+        envelope: &Envelope,
+        state: &State,
+        wish: Vector3<f64>,
+        [glide, glide_now]: [f64; 2],
+        ease_m: f64,
+    ) -> bool {
         let h = envelope.period_s;
         let (half, whole) = (h * h / 2.0, h * h / 2.0 + h * glide);
         self.hard.clear();
         self.soft.clear();
-        for plane in &self.planes {
+        let vehicles = self.planes.len() - self.obstacles;
+        let mut meets_vehicle = false;
+        for (number, plane) in self.planes.iter().enumerate() {
             let room = plane.room_m(&state.position_m);
             let closing = plane.normal.dot(&state.velocity_m_s);
             let hard = ((room - closing * h) / half).min((room - closing * (h + glide)) / whole);
@@ -260,6 +285,7 @@ impl Reach {
             } else {
                 hard
             };
+            meets_vehicle |= number < vehicles && plane.normal.dot(&wish) > soft;
             // A half-space that contains the ball of all commands is left out.
             for (half_spaces, limit) in [(&mut self.hard, hard), (&mut self.soft, soft)] {
                 if limit < envelope.accel_m_s2 {
@@ -267,6 +293,7 @@ impl Reach {
                 }
             }
         }
+        meets_vehicle
     }
 }
 
@@ -361,5 +388,31 @@ mod tests {
         let scaled = reach.choose(&envelope, &state, wish, Choice::Scale).acceleration;
         assert!(scaled.x < wish.x && scaled.y == 0.0, "{scaled}");
         assert_eq!(right_hand(Vector3::z()), Vector3::y());
+    }
+
+    #[test]
+    fn a_vehicle_before_an_obstacle_turns_to_the_side_of_its_wish() {
+        let envelope = ENVELOPE();
+        let state = State { position_m: Vector3::zeros(), velocity_m_s: Vector3::zeros() };
+        let wall = Plane { normal: Vector3::x(), offset_m: 1e-6 };
+        let beside = Plane { normal: -Vector3::x(), offset_m: 1.0 };
+        for turn in [1.0, -1.0] {
+            let choice = Choice::GiveWay { ease_m: 0.2, turn };
+            let chosen = |vehicles: &[Plane], obstacles: &[Plane], wish: Vector3<f64>| {
+                let mut reach = Reach::default();
+                vehicles.iter().for_each(|plane| reach.push(*plane));
+                reach.push_obstacles(obstacles.iter().copied());
+                reach.choose(&envelope, &state, wish, choice).acceleration
+            };
+            // A wish clearly to the other side of the turn, and one nearly straight at the wall.
+            let (aside, straight) = (Vector3::new(2.0, 1.6 * turn, 0.0), Vector3::new(2.0, 0.5 * turn, 0.0));
+            assert!(chosen(&[], &[wall], aside).y * turn > 1.6, "{}", chosen(&[], &[wall], aside));
+            assert!(chosen(&[], &[wall], straight).y * turn < 0.0, "{}", chosen(&[], &[wall], straight));
+            // Before a vehicle, with or without an obstacle, the turn is to the same side for all wishes.
+            assert!(chosen(&[wall], &[], aside).y * turn < 0.0, "{}", chosen(&[wall], &[], aside));
+            assert!(chosen(&[wall], &[wall], aside).y * turn < 0.0, "{}", chosen(&[wall], &[wall], aside));
+            // A vehicle that is not in the way has no effect.
+            assert_eq!(chosen(&[beside], &[wall], aside), chosen(&[], &[wall], aside));
+        }
     }
 }

@@ -272,7 +272,8 @@ impl Shield {
         let (segment, is_level) = (self.segment, limits.settings().is_level);
         let planes = self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach));
         let height_m = reference.position_m.z;
-        self.reach.extend(planes.filter_map(|plane| if is_level { plane.in_level(height_m) } else { Some(plane) }));
+        self.reach
+            .push_obstacles(planes.filter_map(|plane| if is_level { plane.in_level(height_m) } else { Some(plane) }));
         self.counters.renewed(renewed);
         let drag = reference.velocity_m_s * limits.settings().a22_per_s;
         let wanted = if is_level { Vector3::new(wanted.x, wanted.y, 0.0) } else { wanted };

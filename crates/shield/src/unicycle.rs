@@ -410,7 +410,7 @@ impl UnicycleShield {
             horizons: [self.horizon; 2],
         };
         self.counters.renewed(self.contracts.renew(&instant, &mut self.near));
-        self.near.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
+        self.near.push_obstacles(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
         if !(wanted.accel_m_s2.is_finite() && wanted.turn_rad_s.is_finite()) {
             self.counters.chosen(true, 1.0, 1.0);
             return self.fall_back();
