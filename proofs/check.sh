@@ -118,6 +118,7 @@ unproved() {
 unproved resolution constants 's/^Definition RESOLUTION : R := 8.0/Definition RESOLUTION : R := 6.0/' decisions
 unproved band constants 's/^Definition GRAZING_BAND : R := 16.0/Definition GRAZING_BAND : R := 7.0/' decisions
 unproved budget constants 's/^Definition MOTION_M : R := 1.5e-7/Definition MOTION_M : R := 2e-7/' margin
+unproved grid constants 's/^Definition GRID_STEP : R := 60.0/Definition GRID_STEP : R := 50.0/' tube
 unproved unbounded resolution 's/Rmin \((rounded (- start_rate \/ speed_squared))\) 1/\1/' decisions
 
 # The replay of contract logs, by the functions that Coq extracts from replay.v.

@@ -13,7 +13,8 @@ constants() {
     echo
     echo "(** \`$file\` *)"
     for name; do
-        value=$(sed -n "s/^ *\(pub\(([a-z]*)\)\{0,1\} \)\{0,1\}const ${name%=*}: [fu][0-9]* = \(.*\);\$/\3/p" "$root/$file")
+        pattern="^ *\(pub\(([a-z]*)\)\{0,1\} \)\{0,1\}const ${name%=*}: [a-z0-9]* = \(.*\);\$"
+        value=$(sed -n "s/$pattern/\3/p" "$root/$file")
         if [ "$(printf '%s\n' "$value" | grep -c .)" != 1 ]; then
             echo "$file: constant ${name%=*} is missing or defined twice" >&2
             exit 1
@@ -68,6 +69,7 @@ constants crates/shield/src/settings.rs FARTHEST_M ROUNDING_M MOTION_M NORMAL_M 
 constants crates/shield/src/plane.rs UNIT SINGLE
 constants crates/shield/src/choice.rs ROUNDING=COMMAND_ROUNDING
 constants crates/shield/src/report.rs ROUNDING=UNREPORTED
+constants crates/shield/src/tube.rs CELL_RATE TERMS STATES GRID_STEP
 
 echo
 echo '(** Check sums of modelled functions. After a change, compare the function with its model:'
@@ -76,9 +78,11 @@ functions crates/audit/src/sweep.rs 'fn larger(' 'fn new(' 'fn interpolated(' 'f
     'fn closest(' 'fn improve(' 'fn separation_m('
 functions crates/audit/src/ledger.rs 'let is_surely_below'
 functions crates/audit/src/cross_check.rs 'fn is_near(' 'fn grazing_band('
-functions crates/audit/src/pair_sweep.rs 'fn with_cutoff(' 'fn add(' 'fn add_close(' 'fn straight(&self) ' 'fn interpolated('
+functions crates/audit/src/pair_sweep.rs 'fn with_cutoff(' 'fn add(' 'fn add_close(' 'fn straight(&self) ' \
+    'fn interpolated('
 functions crates/audit/src/segment.rs 'fn fraction('
 functions crates/shield/src/plane.rs 'fn scaled(' 'fn stretch(' 'fn true_plane(' 'fn room_m(' 'fn contains(' \
     'fn owner_plane(' 'fn follower_plane(' 'fn unit(' 'fn is_valid('
 functions crates/shield/src/settings.rs 'let margin_m ='
+functions crates/shield/src/tube.rs 'fn exponential('
 echo '*)'

@@ -38,6 +38,12 @@ Definition COMMAND_ROUNDING : R := 1e-12.
 (** `crates/shield/src/report.rs` *)
 Definition UNREPORTED : R := 2.5e-7.
 
+(** `crates/shield/src/tube.rs` *)
+Definition CELL_RATE : R := 0.5.
+Definition TERMS : R := 20.
+Definition STATES : R := 5.
+Definition GRID_STEP : R := 60.0.
+
 (** Check sums of modelled functions. After a change, compare the function with its model:
 
 - 2193954305 `fn larger(` of `crates/audit/src/sweep.rs`
@@ -67,4 +73,5 @@ Definition UNREPORTED : R := 2.5e-7.
 - 2444268779 `fn unit(` of `crates/shield/src/plane.rs`
 - 3642325604 `fn is_valid(` of `crates/shield/src/plane.rs`
 - 2741795934 `let margin_m =` of `crates/shield/src/settings.rs`
+- 3360143635 `fn exponential(` of `crates/shield/src/tube.rs`
 *)

@@ -71,6 +71,17 @@ Definition PLANE_M : R := 16 * u * FARTHEST_M.
 (** Largest deviation of the length of a unit normal from 1. *)
 Definition OFF_UNIT : R := 5.2e-15.
 
+(** Rounding of the reference of a vehicle in the rows of `settings.rs` that are not proved here: an excess that is not
+    reported, brake and reference, and the largest command \[m\]. *)
+Definition REFERENCE_M : R := UNREPORTED + MOTION_M + COMMAND_ROUNDING * STIFF_M.
+
+(** The rows of the budget before an obstacle add up to at most half of [ROUNDING_M]. *)
+Theorem obstacle_budget : REFERENCE_M + NORMAL_M + PLANE_M + OFF_UNIT * FARTHEST_M + 1e-9 <= ROUNDING_M / 2.
+Proof.
+  unfold REFERENCE_M, NORMAL_M, PLANE_M, OFF_UNIT, FARTHEST_M, UNREPORTED, MOTION_M, COMMAND_ROUNDING, STIFF_M,
+    ROUNDING_M, u. lra.
+Qed.
+
 Definition is_unit (n : vector) : Prop := doubles n /\ 1 - OFF_UNIT <= norm n <= 1 + OFF_UNIT.
 
 (** Bound of the errors of underflow, 5e-100. *)
@@ -429,17 +440,6 @@ Qed.
 End Margins.
 
 (** ** Two vehicles *)
-
-(** Rounding of the reference of a vehicle in the rows of `settings.rs` that are not proved here: an excess that is not
-    reported, brake and reference, and the largest command \[m\]. *)
-Definition REFERENCE_M : R := UNREPORTED + MOTION_M + COMMAND_ROUNDING * STIFF_M.
-
-(** The rows of the budget before an obstacle add up to at most half of [ROUNDING_M]. *)
-Theorem obstacle_budget : REFERENCE_M + NORMAL_M + PLANE_M + OFF_UNIT * FARTHEST_M + 1e-9 <= ROUNDING_M / 2.
-Proof.
-  unfold REFERENCE_M, NORMAL_M, PLANE_M, OFF_UNIT, FARTHEST_M, UNREPORTED, MOTION_M, COMMAND_ROUNDING, STIFF_M,
-    ROUNDING_M, u. lra.
-Qed.
 
 (** Two references that the computed tests find inside their planes. The vehicles are within their tubes of them, but
     for rounding of the references. Then the vehicles are at least delta apart in the lengths of the metric. *)
