@@ -1,7 +1,7 @@
 (** * Rounding of vectors of doubles
 
-    Binary64, round to nearest, ties to even (Flocq). [rounded] has no largest number, so overflow is not modelled: the
-    inputs of its users are bounded far below it. Underflow is included: its error is at most [least]. Rust rounds each
+    Binary64, round to nearest, ties to even (Flocq). [rounded] has no largest number: `overflow.v` bounds the values of
+    the sweep, and those of the shield are within 1e6 m. Underflow is included: its error is at most [least]. Rust rounds each
     operation on its own and fuses none. `dot` and `norm_squared` of nalgebra add (x + y) + z, as [fdot] does. *)
 
 From Coq Require Import Reals Lra ZArith Lia.
