@@ -367,7 +367,7 @@ Qed.
 End Lines.
 
 (** The relative position at a fraction of the motion is that of the two lines at this time. *)
-Theorem position_is_straight : forall l t0 t1 s, from_s l < to_s l -> from_s l <= t0 <= to_s l -> from_s l <= t1
+Lemma position_is_straight : forall l t0 t1 s, from_s l < to_s l -> from_s l <= t0 <= to_s l -> from_s l <= t1
   <= to_s l ->
   0 <= s <= 1 ->
   position l (t0 + s * (t1 - t0)) true = on_line (position l t0 false) (position l t1 true) s.

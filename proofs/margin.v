@@ -312,7 +312,7 @@ Proof.
 Qed.
 
 (** A point that the computed test finds inside is inside, but for [PLANE_M]. *)
-Theorem inside_before_rounding : 0 <= room (true_plane vertical n offset) p ->
+Lemma inside_before_rounding : 0 <= room (true_plane vertical n offset) p ->
   dot n (scaled vertical p) <= bound + PLANE_M * stretch vertical.
 Proof.
   intros R. pose proof product_is_small as P. destruct stretch_is_most as [_ O].

@@ -81,7 +81,7 @@ Proof.
   unfold dot_values, fdot. repeat apply Forall_cons; try apply Forall_nil; unfold is_at_most; lra.
 Qed.
 
-Theorem closest_does_not_overflow : forall from to,
+Lemma closest_does_not_overflow : forall from to,
   Forall (is_at_most 1e72) (coordinates from) -> Forall (is_at_most 1e72) (coordinates to) ->
   Forall (is_at_most 1e150) (closest_values from to).
 Proof.
@@ -133,7 +133,7 @@ Proof.
   rewrite sqrt_sqrt by auto. assert (1 * b <= b * b) by (apply Rmult_le_compat_r; lra). lra.
 Qed.
 
-Theorem decisions_do_not_overflow : forall from to interpolated limit,
+Lemma decisions_do_not_overflow : forall from to interpolated limit,
   Forall (is_at_most 1e72) (coordinates from) -> Forall (is_at_most 1e72) (coordinates to) ->
   0 <= interpolated <= 1e150 -> 0 <= limit <= 1e70 ->
   Forall (is_at_most 1e160) (decision_values from to interpolated limit).

@@ -296,7 +296,7 @@ Proof.
 Qed.
 
 (** The computed separation is at most the separation at any fraction, and this error. *)
-Theorem root_is_least : forall s, norm d <= huge -> 0 <= s <= 1 ->
+Lemma root_is_least : forall s, norm d <= huge -> 0 <= s <= 1 ->
   sqrt (closest from to) <= (1 - u) * norm (on_line from to s) + 12.4 * u * norm from + 2 * tiny.
 Proof.
   intros s HD S. pose proof tiny_is_positive as T.
@@ -394,7 +394,7 @@ Proof.
 Qed.
 
 (** The computed separation is at least the separation at some fraction, less this error. *)
-Theorem root_is_attained : exists s, 0 <= s <= 1 /\
+Lemma root_is_attained : exists s, 0 <= s <= 1 /\
   norm (on_line from to s) <= sqrt (closest from to) + 6.7 * u * norm from + 2 * tiny.
 Proof.
   destruct closest_is_of_candidates as (C1 & _ & _ & C).

@@ -239,7 +239,7 @@ Definition is_computed_product (m : nat) (a b p : matrix) : Prop :=
     sum_of (a i) (fun k => b k j) m' (product a b i j) (sum n (fun k => Rabs (a i k) * Rabs (b k j))) (p i j).
 
 (** Products of m terms err by at most 1.01 m u times the product of the norms. *)
-Theorem product_error : forall m a b p c d,
+Lemma product_error : forall m a b p c d,
   (m <= 100)%nat -> is_computed_product m a b p -> at_most a c -> at_most b d -> 0 <= d ->
   at_most (minus p (product a b)) (1.01 * INR m * u * (c * d) + INR n * (3 * INR m * least)).
 Proof.
@@ -608,7 +608,7 @@ Hypothesis largest_is_large : 1 <= largest.
 Definition step_error (k : nat) : matrix := minus (points (S k)) (product cell (points k)).
 
 (** A step of the grid errs by at most [GRID_STEP] u times the largest computed norm. *)
-Theorem grid_step_error : forall k, (k <= cells)%nat -> at_most (step_error k) (GRID_STEP * u * largest).
+Lemma grid_step_error : forall k, (k <= cells)%nat -> at_most (step_error k) (GRID_STEP * u * largest).
 Proof.
   intros k K. pose proof (points_are_small k K) as P. pose proof largest_is_large as L.
   assert (C : at_most computed_cell (1.652 + 45 * u)).
