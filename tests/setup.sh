@@ -54,6 +54,7 @@ fi
 # The checker of proofs/, and the compiler and integers of proofs/replay.
 if needed_by proofs; then
     has coqc && has coqchk || debian coq
+    [ -e "$(coqc -where)/user-contrib/Flocq/Version.vo" ] || debian libcoq-flocq
     ls "$(ocamlfind query zarith 2>/dev/null)/zarith.cmxa" >/dev/null 2>&1 ||
         debian ocaml ocaml-findlib libzarith-ocaml-dev
 fi

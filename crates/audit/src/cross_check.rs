@@ -134,10 +134,10 @@ fn distance(shape: &Shape, point: Vector3<f64>) -> f64 {
 ///
 /// The cast decides by b^2 - |d|^2 (|r0|^2 - delta^2) and takes its root. Each sum of three products carries 3 u (u =
 /// eps/2). The discriminant over |d|^2, which is delta^2 less the squared distance of the line, is off by at most 17 u
-/// |r0|^2 + 7 u delta^2, and the root adds 3 u of both. The closed form adds 8 u |r0| delta
-/// (`RelativeMotion::resolution_m` without its margin). Interpolated ends add 16 u S delta, S their scale. The sum
-/// stays below 24 u = 12 eps and is rounded up to a power of two. At |r0| = 10 m and delta = 2 m the band is 1e-13 m
-/// wide.
+/// |r0|^2 + 7 u delta^2, and the root adds 3 u of both. The closed form adds at most 6 u of both: the separation errs by
+/// 6 u |r0|, and by up to 13 u |r0| near separation 0. Interpolated ends add 16 u S delta, S their scale. The sum
+/// stays below 26 u = 13 eps and is rounded up to a power of two. At |r0| = 10 m and delta = 2 m the band is 1e-13 m
+/// wide. `proofs/decisions.v` proves that a motion farther than this band is not below delta.
 const GRAZING_BAND: f64 = 16.0 * f64::EPSILON;
 
 /// Length below which a relative motion is cast as zero \[m\]: its square underflows, and no accepted delta resolves

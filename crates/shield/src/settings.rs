@@ -9,6 +9,7 @@
 //! | --- | --- | --- | --- | --- |
 //! | 2.5e-7 m | excess of a bound that is not reported | itself | | 2.5e-7 m |
 //! | u | plane at a point: product, offset, margin | 16 u C | C <= 1e6 m | 1.8e-9 m |
+//! | u | margin of the vehicle | 9 u times the margin | margin <= 1e6 m | 1e-9 m |
 //! | u | brake, reference, tracker | u C (16 (m + 2) + 8 J) | [`Limits::farthest_m`] | 1.5e-7 m |
 //! | 1e-12 | largest command and speed, relative | 1e-12 A / kp | A / kp <= 1e4 m | 1e-8 m |
 //! | 1e-14 | squared length of a normal | 5e-15 times the margin | margin <= 1e6 m | 5e-9 m |
@@ -20,6 +21,9 @@
 //! | 1e-9 | periods of slowing down of a unicycle | 0: the rest point is kept | | 0 |
 //! | 1e-12 | speeds of a unicycle, relative | 1e-12 w | w <= 100 m | 1e-10 m |
 //! | u | normal before an obstacle at d, with the reach R | 8 u C R / d | C by this row | 8e-8 m |
+//!
+//! `proofs/margin.v` proves the rows of the plane, the margin and the squared length of a normal. It also proves that
+//! the rows of a vehicle that can stop add up to at most 5e-7 m.
 //!
 //! *Brake.* In each of its periods the position errs by at most 8 u C, and the speed by at most 4 u V. The time left
 //! times V is at most twice the length of the segment, so the stop point moves by at most 8 u C. It errs by 16 u C

@@ -49,7 +49,8 @@
 //!   N^ + `eps_q` N) times its bound. All terms of the sums are positive, so adding K periods errs by less than (K +
 //!   400) u of the sum.
 //!
-//! The numbers of this bound are rounded too: the terms above are doubled.
+//! The numbers of this bound are rounded too: the terms above are doubled. `proofs/tube.v` proves the rows of the cell
+//! and of the grid, given the error of X.
 
 pub mod irregular;
 
