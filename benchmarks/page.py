@@ -35,10 +35,10 @@ MISSIONS = (
     "Scenes are rebuilt from the published parameters below; random ones are other draws of the same distribution. "
     "Vehicles are points. Commands have a limit, so no law has a certificate without the shield. Cells give numbers "
     "of flights that succeeded without/under the shield, and in parentheses those that collided, if any; `-` was not "
-    "flown. A flight *succeeded* if it is clear throughout, with each vehicle at its goal to the end. A collision is "
-    "*hidden* if no sample at the source's rate shows it. `*`: the law does not support ellipsoids. Without the shield "
-    "it flies in heights that are divided such that the ellipsoids are balls. All its limits are divided too, so that "
-    "the true ones hold."
+    "flown, and `of` gives another number of flights. A flight *succeeded* if it is clear throughout, with each "
+    "vehicle at its goal to the end. A collision is *hidden* if no sample at the source's rate shows it. `*`: the law "
+    "does not support ellipsoids. Without the shield it flies in heights that are divided such that the ellipsoids "
+    "are balls. All its limits are divided too, so that the true ones hold."
 )
 LAWS = (
     "A flight under the displacement law ends at the limit, so its smallest separation is just below the limit. This "
@@ -48,7 +48,7 @@ LAWS = (
     "the displacement law and the shield avoid blocks, walls and columns. RVO2 has no limit on acceleration: its own "
     "method may succeed where `orca` collides."
 )
-PUBLISHED = "Published rates of the methods of the sources, and rates of the laws here, over all flights of a row:"
+PUBLISHED = "Published rates of the sources' own methods beside the best laws here, over all flights of a row:"
 SAMPLING = (
     "Cells give the separation at samples and, in parentheses, on straight lines between the samples [m], rounded "
     "down. The whole motion decides the verdict. A cell in bold does not show a violation."
@@ -183,21 +183,21 @@ def missions(rows: Sequence[Row], program: str) -> list[str]:
 
 
 def cell(bare: Row | None, shielded: Row | None, flights: int) -> str:
-    """Returns the numbers of flights that succeeded, and in parentheses those that collided if there are any."""
-    text = "/".join(succeeded(row, flights) for row in (bare, shielded))
-    collided = [row["collided"] if row else 0 for row in (bare, shielded)]
-    if any(collided):
-        hidden = sum(row["hidden"] for row in (bare, shielded) if row)
-        text += f" ({collided[0]}/{collided[1]}" + (f", {hidden} hidden)" if hidden else ")")
+    """Returns the numbers of flights that succeeded, and in parentheses those that collided if there are any.
+
+    Numbers of flights other than `flights` follow `of`.
+    """
+    sides = (bare, shielded)
+    text = "/".join(f"{row['succeeded']}{'*' if row.get('as_balls') else ''}" if row else "-" for row in sides)
+    both = [row for row in sides if row]
+    numbers = list(dict.fromkeys(row["flights"] for row in both))
+    if any(number != flights for number in numbers):
+        text += f" of {'/'.join(map(str, numbers))}"
+    if any(row["collided"] for row in both):
+        hidden = sum(row["hidden"] for row in both)
+        text += f" ({'/'.join(str(row['collided']) if row else '-' for row in sides)}"
+        text += f", {hidden} hidden)" if hidden else ")"
     return text
-
-
-def succeeded(row: Row | None, flights: int) -> str:
-    """Returns the number of flights of a row that succeeded, with the number of flights if it is another one."""
-    if row is None:
-        return "-"
-    of = f" of {row['flights']}" if row["flights"] != flights else ""
-    return f"{row['succeeded']}{'*' if row.get('as_balls') else ''}{of}"
 
 
 def published(shown: Sequence[Row]) -> list[str]:
@@ -209,16 +209,19 @@ def published(shown: Sequence[Row]) -> list[str]:
     if not groups:
         return []
     lines = []
+    above = None
     for (name, rate), rows in groups.items():
         counts = dict.fromkeys(row["mission"].split(", ")[1].split()[0] for row in rows)
         use = [best([row for row in rows if row["shield"] == shield]) for shield in (False, True)]
-        lines.append((f"{name}, {' / '.join(counts)} agents", rate, *use, rows[0]["why_other_rate"]))
+        why = rows[0]["why_other_rate"]
+        lines.append((f"{name}, {' / '.join(counts)} agents", rate, *use, "as above" if why == above else why))
+        above = why
     header = ("mission", "published", "here, best laws without the shield", "here, best laws under it", "difference")
     return [PUBLISHED, table(header, lines)]
 
 
 def best(rows: Sequence[Row]) -> str:
-    """Returns the laws with the most flights that count as the published rate counts, and their number."""
+    """Returns the laws with the largest share of flights that count as the published rate counts, and their counts."""
     found: dict[str, tuple[int, int]] = {}
     for row in rows:
         count, flights = found.get(row["law"], (0, 0))
@@ -226,10 +229,12 @@ def best(rows: Sequence[Row]) -> str:
     if not found:
         return "-"
     most = max(count / flights for count, flights in found.values())
-    laws = [law for law, (count, flights) in found.items() if count / flights == most]
-    count, flights = found[laws[0]]
     word = "clear" if rows[0]["compared"] == "safe" else "succeeded"
-    return f"{count} of {flights} {word} ({', '.join(laws)})"
+    laws: dict[tuple[int, int], list[str]] = {}
+    for law, (count, flights) in found.items():
+        if count / flights == most:
+            laws.setdefault((count, flights), []).append(law)
+    return "; ".join(f"{count} of {flights} {word} ({', '.join(names)})" for (count, flights), names in laws.items())
 
 
 def totals(rows: Sequence[Row]) -> str:

@@ -437,25 +437,28 @@ def missions(quick: bool, seeds: int) -> list[Mission]:
     forest_changes = lsc_changes + "; all columns 3 m high"
     gcbf_changes = "norms in place of limits by axis; no obstacles; 60 s in place of 7.68 s"
     rvo_changes = "commands up to 5 m/s^2 in place of velocities taken at once; starts moved by up to 1 cm"
-    dubins = "points that may stop, with commands up to speed^2 / turning radius, in place of Dubins vehicles; "
+    dubins = "points that may stop in place of Dubins vehicles, with commands up to speed^2 / turning radius. "
+    stay = "Vehicles stay at their goals. 60 s in place of 10 s; starts moved by up to 1 cm. "
     r3r_circle_changes = (
-        dubins + "60 s in place of 10 s; starts moved by up to 1 cm; vehicles stay at their goals. One flight for each "
-        "range of the radio: 1, 1.5, 2, 2.5 and 3 m. The radio carries the messages of the shield, and those of the "
-        "displacement law; the other laws sense neighbours"
+        dubins + stay + "One flight for each range of the radio: 1, 1.5, 2, 2.5 and 3 m. The radio carries the "
+        "messages of the shield and of the displacement law; the other laws sense neighbours"
     )
     r3r_indoor_changes = (
-        dubins + "all vehicles are there from start to end (source: a vehicle joins when it has a plan, and leaves at "
-        "its goal); starts at least 1 m apart, goals too; no planner of paths; 370 s"
+        dubins + "All vehicles are there from start to end; in the source, a vehicle joins when it has a plan, and "
+        "leaves at its goal. Starts at least 1 m apart, goals too; no planner of paths; 370 s"
     )
     lsc_published = "no collision; most successes of four planners (values in a figure only)"
-    lsc_why = "here the space has no bounds, and commands change at 20 Hz or more (source: plans at 5 Hz)"
-    nmpc = "baseline of R3R (NMPC), no collision: {} of 5 ranges"
+    lsc_why = "Here the space has no bounds, and commands change at 20 Hz or more (source: plans at 5 Hz)"
+    nmpc = "NMPC, the baseline of R3R: no collision at {} of 5 ranges"
     nmpc_why = (
-        "the baseline has no guarantee; its rate is of a figure beside this trial that names no method. Under the "
-        "shield, vehicles wait behind the planes of pairs beyond the range, which cannot renew them"
+        "NMPC has no guarantee. The figure of its rate is beside this trial and names no method. Arrivals under the "
+        "shield need the range: pairs beyond it keep their last plane, and vehicles wait behind it"
     )
-    r3r_published = "R3R: 100 % of agents without collision, up to 128; arrivals: not in the sources that we could read"
-    r3r_why = "laws fly straight to their slots and stop at walls; only the shield and `displacement` avoid walls"
+    r3r_published = "R3R: 100 % safety, up to 128 agents; we found no public text with its arrivals"
+    r3r_why = (
+        "The rate of safety comes back under the shield, but no flight arrives: laws fly straight to their slots and "
+        "stop at walls, where R3R plans paths"
+    )
     listed = [
         Mission(
             f"LSC, {n} agents",
@@ -479,7 +482,7 @@ def missions(quick: bool, seeds: int) -> list[Mission]:
             forest,
             seeds,
             published="LSC: 100 %; EGO-Swarm: 50 % (30 flights each)",
-            why="LSC plans paths around columns; the shield passes them only on its right",
+            why="The rate comes back under the shield. Without it, no law here avoids columns and arrives",
         )
     )
     listed += [
@@ -501,7 +504,7 @@ def missions(quick: bool, seeds: int) -> list[Mission]:
             f"R3R circle without a limit of the range, {n} agents",
             r3r_circle_source,
             "never unsafe, each within 0.5 m",
-            dubins + "60 s in place of 10 s; starts moved by up to 1 cm; vehicles stay at their goals; no radio",
+            dubins + stay + "No radio",
             r3r_circle(n, limited=False),
             len(R3R_RANGES_M),
         )

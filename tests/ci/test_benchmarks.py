@@ -272,12 +272,31 @@ class Page(unittest.TestCase):
         between = page.totals([row | {"ended_between": 2}])
         self.assertTrue(between.startswith(counts + " 2 flights ended at the limit between two samples."), between)
 
+    def test_a_cell_names_other_numbers_of_flights_and_collisions(self):
+        row = {"flights": 30, "succeeded": 29, "collided": 0, "hidden": 0}
+        few, ball = row | {"flights": 5, "succeeded": 5}, row | {"as_balls": True}
+        hit = row | {"collided": 3, "hidden": 1}
+        for bare, shielded, text in (
+            (row, row, "29/29"),
+            (None, row, "-/29"),
+            (ball, row, "29*/29"),
+            (few, few, "5/5 of 5"),
+            (few, row, "5/29 of 5/30"),
+            (hit, row, "29/29 (3/0, 1 hidden)"),
+            (None, hit | {"hidden": 0}, "-/29 (-/3)"),
+            (None, None, "-/-"),
+        ):
+            self.assertEqual(page.cell(bare, shielded, 30), text)
+
     def test_the_best_laws_are_those_with_the_largest_share(self):
         rows = [
             {"law": law, "compared": "succeeded", "succeeded": count, "safe": 0, "flights": flights}
             for law, count, flights in (("orca", 5, 10), ("bvc", 2, 3), ("bvc", 2, 3), ("cbf-qp", 4, 6))
         ]
         self.assertEqual(page.best(rows), "4 of 6 succeeded (bvc, cbf-qp)")
+        self.assertEqual(page.best(rows[:2]), "2 of 3 succeeded (bvc)")
+        tied = [rows[1], rows[3]]
+        self.assertEqual(page.best(tied), "2 of 3 succeeded (bvc); 4 of 6 succeeded (cbf-qp)")
         clear = [row | {"compared": "safe", "safe": row["flights"]} for row in rows[:1]]
         self.assertEqual(page.best(clear), "10 of 10 clear (orca)")
         self.assertEqual(page.best([]), "-")
