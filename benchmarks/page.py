@@ -165,7 +165,7 @@ def missions(rows: Sequence[Row], program: str) -> list[str]:
         missions.setdefault(row["mission"], {})[row["law"], row["shield"]] = row
     lines = []
     for mission, use in missions.items():
-        flights = next(iter(use.values()))["flights"]
+        flights = max(row["flights"] for row in use.values())
         found = [cell(use.get((law, False)), use.get((law, True)), flights) for law in laws]
         lines.append((mission, f"{flights}", *found))
     sources = dict.fromkeys(
