@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from program import Point, Program, Unusable, separation_m
-from scenes import Mission, Scene, missions
+from scenes import Mission, Scene, distance_to_box, missions
 
 Row = dict[str, Any]
 
@@ -19,7 +19,10 @@ Row = dict[str, Any]
 UNSEEN = ("hidden", "ended_between")
 
 # Laws with absolute slots. The others reach a formation up to translation, and flocking has no slots.
-LAWS = ("displacement", "orca", "cbf-qp")
+LAWS = ("displacement", "orca", "bvc", "cbf-qp", "cbf-qp braking")
+
+# Laws that keep balls apart, but no ellipsoids. Without the shield they fly `Scene.as_balls`.
+BALLS_ONLY = ("orca", "bvc", "cbf-qp", "cbf-qp braking")
 OTHER_LAWS = {
     "edge-tension": "controls distances: its formation may be rotated and moved",
     "laplacian": "controls displacements and follows no reference: its formation may be moved",
@@ -51,6 +54,10 @@ def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
         "source": mission.source,
         "success": mission.success,
         "changes": mission.changes,
+        "published": mission.published,
+        "why_other_rate": mission.why,
+        "compared": mission.compared,
+        "as_balls": False,
         "status": "measured",
         "why": None,
     }
@@ -60,6 +67,9 @@ def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
     least_m = math.inf
     for seed in range(mission.seeds):
         scene = mission.scene(seed)
+        if scene.half_axes_m and law in BALLS_ONLY and not shield:
+            scene = scene.as_balls()
+            entry["as_balls"] = True
         try:
             report = program.fly(scene.text(law, shield))
         except Unusable as refusal:
@@ -107,7 +117,7 @@ def on_grid(t: float, rate_hz: float) -> bool:
 
 
 def seen(scene: Scene, sample: Sequence[Point]) -> bool:
-    """Returns whether two vehicles are closer than delta at a sample, or one is within a clearance of a box.
+    """Returns whether two vehicles are closer than delta at a sample, or one is within a clearance of an obstacle.
 
     Lengths are scaled for an ellipsoid, as in the audit.
     """
@@ -119,9 +129,11 @@ def seen(scene: Scene, sample: Sequence[Point]) -> bool:
                 break
             if math.dist(first, second) < scene.delta_m:
                 return True
-    for _, at, size in scene.boxes:
-        for point in sample:
-            outside = (max(0.0, abs(x - c) - s / 2) for x, c, s in zip(point, at, size, strict=True))
-            if math.hypot(*outside) < scene.delta_m / 2:
+    for point in sample:
+        if any(distance_to_box(point, at, size) < scene.delta_m / 2 for _, at, size in scene.boxes):
+            return True
+        for _, (x, y, z), radius_m in scene.columns:
+            nearest_z = min(max(point[2], z - 2.0), z + 3.0)
+            if math.dist(point, (x, y, nearest_z)) < radius_m + scene.delta_m / 2:
                 return True
     return False

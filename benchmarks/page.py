@@ -34,15 +34,21 @@ WORLDS = (
 MISSIONS = (
     "Scenes are rebuilt from the published parameters below; random ones are other draws of the same distribution. "
     "Vehicles are points. Commands have a limit, so no law has a certificate without the shield. Cells give numbers "
-    "of flights without/under the shield; `-` was not flown. A flight *succeeded* if it is clear throughout, with each "
-    "vehicle at its goal to the end. A collision is *hidden* if no sample at the source's rate shows it."
+    "of flights that succeeded without/under the shield, and in parentheses those that collided, if any; `-` was not "
+    "flown, and `of` gives another number of flights. A flight *succeeded* if it is clear throughout, with each "
+    "vehicle at its goal to the end. A collision is *hidden* if no sample at the source's rate shows it. `*`: the law "
+    "does not support ellipsoids. Without the shield it flies in heights that are divided such that the ellipsoids "
+    "are balls. All its limits are divided too, so that the true ones hold."
 )
 LAWS = (
     "A flight under the displacement law ends at the limit, so its smallest separation is just below the limit. This "
-    "law has no limit on speed; its gains keep a lone vehicle below the limit. The shield holds commands for 0.05 s, "
-    "too long for this law on the complete graph of 40 vehicles or more in LSC. Only the displacement law and the "
-    "shield avoid blocks. RVO2 has no limit on acceleration: its own method may succeed where `orca` collides."
+    "law has no limit on speed; its gains keep a lone vehicle below the limit. `orca` and `cbf-qp` have their default "
+    "gains; those of `bvc` and `cbf-qp braking` arrived soonest of five choices over other seeds. The shield holds "
+    "commands for 0.05 s, too long for the displacement law on the complete graph of 40 vehicles or more in LSC. Only "
+    "the displacement law and the shield avoid blocks, walls and columns. RVO2 has no limit on acceleration: its own "
+    "method may succeed where `orca` collides."
 )
+PUBLISHED = "Published rates of the sources' own methods beside the best laws here, over all flights of a row:"
 SAMPLING = (
     "Cells give the separation at samples and, in parentheses, on straight lines between the samples [m], rounded "
     "down. The whole motion decides the verdict. A cell in bold does not show a violation."
@@ -70,7 +76,7 @@ def block(report: dict[str, Any]) -> str:
     if "speed" in groups:
         parts += speed(groups["speed"])
     if "missions" in groups:
-        parts += missions(groups["missions"])
+        parts += missions(groups["missions"], report["program"])
     if "sampling" in groups:
         parts += sampling(groups["sampling"])
     parts += left_out(report["rows"])
@@ -151,7 +157,7 @@ def kind(row: Row) -> str:
     return str(row["name"]).split("/")[0].replace("-", " ")
 
 
-def missions(rows: Sequence[Row]) -> list[str]:
+def missions(rows: Sequence[Row], program: str) -> list[str]:
     shown = [row for row in rows if row["status"] == "measured"]
     laws = list(dict.fromkeys(row["law"] for row in shown))
     missions: dict[str, dict[tuple[str, bool], Row]] = {}
@@ -159,28 +165,76 @@ def missions(rows: Sequence[Row]) -> list[str]:
         missions.setdefault(row["mission"], {})[row["law"], row["shield"]] = row
     lines = []
     for mission, use in missions.items():
-        found = [[cells(use.get((law, shield))) for shield in (False, True)] for law in laws]
-        counts = ["/".join(pair) for sides in found for pair in zip(*sides, strict=True)]
-        lines.append((mission, f"{next(iter(use.values()))['flights']}", *counts))
+        flights = max(row["flights"] for row in use.values())
+        found = [cell(use.get((law, False)), use.get((law, True)), flights) for law in laws]
+        lines.append((mission, f"{flights}", *found))
     sources = dict.fromkeys(
         f"- {row['mission'].split(',')[0]}: {row['source']}. Success: {row['success']}. Changes: {row['changes']}."
         for row in shown
     )
-    names = [f"{law}: {count}" for law in laws for count in ("succeeded", "collided")]
     return [
         "## Missions of other projects",
-        wrapped([MISSIONS]),
+        wrapped([f"Flown with `{program}`; seeds count from 0. " + MISSIONS]),
         wrapped([LAWS + totals(rows)]),
-        table(("mission", "flights", *names), lines),
+        table(("mission", "flights", *laws), lines),
+        *published(shown),
         wrapped(sources),
     ]
 
 
-def cells(row: Row | None) -> list[str]:
-    """Returns the numbers of flights of a row that succeeded and that collided."""
-    if row is None:
-        return ["-", "-"]
-    return [f"{row['succeeded']}", f"{row['collided']}" + (f" ({row['hidden']} hidden)" if row["hidden"] else "")]
+def cell(bare: Row | None, shielded: Row | None, flights: int) -> str:
+    """Returns the numbers of flights that succeeded, and in parentheses those that collided if there are any.
+
+    Numbers of flights other than `flights` follow `of`.
+    """
+    sides = (bare, shielded)
+    text = "/".join(f"{row['succeeded']}{'*' if row.get('as_balls') else ''}" if row else "-" for row in sides)
+    both = [row for row in sides if row]
+    numbers = list(dict.fromkeys(row["flights"] for row in both))
+    if any(number != flights for number in numbers):
+        text += f" of {'/'.join(map(str, numbers))}"
+    if any(row["collided"] for row in both):
+        hidden = sum(row["hidden"] for row in both)
+        text += f" ({'/'.join(str(row['collided']) if row else '-' for row in sides)}"
+        text += f", {hidden} hidden)" if hidden else ")"
+    return text
+
+
+def published(shown: Sequence[Row]) -> list[str]:
+    """Returns the table of published rates beside those of the best laws here."""
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in shown:
+        if row.get("published"):
+            groups.setdefault((row["mission"].split(",")[0], row["published"]), []).append(row)
+    if not groups:
+        return []
+    lines = []
+    above = None
+    for (name, rate), rows in groups.items():
+        counts = dict.fromkeys(row["mission"].split(", ")[1].split()[0] for row in rows)
+        use = [best([row for row in rows if row["shield"] == shield]) for shield in (False, True)]
+        why = rows[0]["why_other_rate"]
+        lines.append((f"{name}, {' / '.join(counts)} agents", rate, *use, "as above" if why == above else why))
+        above = why
+    header = ("mission", "published", "here, best laws without the shield", "here, best laws under it", "difference")
+    return [PUBLISHED, table(header, lines)]
+
+
+def best(rows: Sequence[Row]) -> str:
+    """Returns the laws with the largest share of flights that count as the published rate counts, and their counts."""
+    found: dict[str, tuple[int, int]] = {}
+    for row in rows:
+        count, flights = found.get(row["law"], (0, 0))
+        found[row["law"]] = (count + row[row["compared"]], flights + row["flights"])
+    if not found:
+        return "-"
+    most = max(count / flights for count, flights in found.values())
+    word = "clear" if rows[0]["compared"] == "safe" else "succeeded"
+    laws: dict[tuple[int, int], list[str]] = {}
+    for law, (count, flights) in found.items():
+        if count / flights == most:
+            laws.setdefault((count, flights), []).append(law)
+    return "; ".join(f"{count} of {flights} {word} ({', '.join(names)})" for (count, flights), names in laws.items())
 
 
 def totals(rows: Sequence[Row]) -> str:

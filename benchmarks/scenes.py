@@ -16,7 +16,9 @@ from program import Point, points, scenario
 class Scene:
     """A mission: starts, slots and limits. All numbers are of the source unless `changes` names a difference.
 
-    `sampled_hz` is the rate at which the source checks. A period of it is an integral number of steps.
+    `sampled_hz` is the rate at which the source checks. A period of it is an integral number of steps. Boxes and
+    columns have a name, a position and a size; the size of a column is its radius. Columns stand on the ground.
+    `radio_m` is the range of messages, which are sent at 20 Hz.
     """
 
     name: str
@@ -33,12 +35,36 @@ class Scene:
     dt_s: float = 1 / 240
     half_axes_m: tuple[float, float, float] | None = None
     boxes: tuple[tuple[str, Point, Point], ...] = ()
+    columns: tuple[tuple[str, Point, float], ...] = ()
+    radio_m: float | None = None
+
+    def as_balls(self) -> "Scene":
+        """Returns the scene with heights in units in which the ellipsoids are balls.
+
+        A law for balls flies it. Speeds, accelerations and the radius of arrival are divided too, so that the true
+        ones stay within the limits in every direction. Columns keep their heights, which the flights stay between.
+        """
+        if not self.half_axes_m:
+            return self
+        squash = self.half_axes_m[0] / self.half_axes_m[2]
+        return dataclasses.replace(
+            self,
+            start_m=[(x, y, z * squash) for x, y, z in self.start_m],
+            slots_m=[(x, y, z * squash) for x, y, z in self.slots_m],
+            half_axes_m=None,
+            max_speed_m_s=self.max_speed_m_s * squash,
+            preferred_speed_m_s=self.preferred_speed_m_s * squash,
+            max_accel_m_s2=self.max_accel_m_s2 * squash,
+            reached_m=self.reached_m * squash,
+        )
 
     def text(self, law: str, shield: bool) -> str:
         """Returns the scenario under a law, with or without the shield. Slots are absolute positions.
 
         The displacement law has no limit on speed. Its gains are such that a vehicle alone, at rest at the largest
-        distance from its slot, is critically damped and stays below the largest speed.
+        distance from its slot, is critically damped and stays below the largest speed. The other laws have the limits
+        of the scene. `orca` and `cbf-qp` have their default gains. Those of `bvc` and `cbf-qp braking` arrived soonest
+        of five choices each, over seeds 100 to 102 of GCBF+ with 32 agents and of the forest of LSC.
         """
         farthest_m = max(math.dist(a, b) for a, b in zip(self.start_m, self.slots_m, strict=True))
         rate_per_s = 2 * self.max_speed_m_s / farthest_m
@@ -49,14 +75,21 @@ class Scene:
                 "speed_m_s": self.preferred_speed_m_s,
                 "max_accel_m_s2": self.max_accel_m_s2,
             },
+            "bvc": {
+                "speed_m_s": self.preferred_speed_m_s,
+                "max_accel_m_s2": self.max_accel_m_s2,
+                "k_per_s": 2.0,
+                "tracking_per_s": 10.0,
+            },
             "cbf-qp": {"max_speed_m_s": self.max_speed_m_s, "max_accel_m_s2": self.max_accel_m_s2},
         }
+        laws["cbf-qp braking"] = {"variant": "braking", "k_per_s2": 4.0, "c_per_s": 4.0} | laws["cbf-qp"]
         hull_m = 0.2 * self.delta_m
         tables: dict[str, dict[str, object]] = {
             "swarm": {"dimensions": self.dimensions, "hull_radius_m": hull_m},
             "start": {"positions_m": points(self.start_m)},
             "formation": {"shape": "points", "points_m": points(self.slots_m)},
-            "law": {"kind": law, "delta_m": self.delta_m} | laws[law],
+            "law": {"kind": law.split()[0], "delta_m": self.delta_m} | laws[law],
             "reference": {"kind": "rest"},
             "arrival": {"edge_error_m": self.reached_m, "disagreement_m_s": 10.0, "hold_s": 0.0},
             "actuation": {"max_accel_m_s2": self.max_accel_m_s2},
@@ -64,18 +97,27 @@ class Scene:
         }
         if self.half_axes_m:
             tables["safety"] = {"shape": "ellipsoid", "half_axes_m": str(list(self.half_axes_m))}
+        if self.radio_m:
+            tables["network"] = {"range_m": self.radio_m, "rate_hz": 20.0}
         if shield:
             tables["shield"] = {"max_speed_m_s": self.max_speed_m_s}
         rest = ""
         for name, at, size in self.boxes:
             rest += f'\n[[obstacle]]\nname = "{name}"\nat_m = {list(at)}\nclearance_m = {self.delta_m / 2}\n'
             rest += f"box = {{ size_m = {list(size)} }}\n"
+        for name, at, radius_m in self.columns:
+            rest += f'\n[[obstacle]]\nname = "{name}"\nat_m = {list(at)}\nclearance_m = {self.delta_m / 2}\n'
+            rest += f"capsule = {{ from_m = [0.0, 0.0, -2.0], to_m = [0.0, 0.0, 3.0], radius_m = {radius_m} }}\n"
         return scenario(self.name, tables, rest)
 
 
 @dataclasses.dataclass(frozen=True)
 class Mission:
-    """A published benchmark: its source, its success, what differs here, and the scene of each seed."""
+    """A published benchmark: its source, its success, what differs here, and the scene of each seed.
+
+    `published` is a rate of the source and `why` the reason for another rate here. `compared` is the count of flights
+    that corresponds to the published rate.
+    """
 
     name: str
     source: str
@@ -84,6 +126,9 @@ class Mission:
     scene: Callable[[int], Scene]
     seeds: int
     quick: bool = False
+    published: str | None = None
+    why: str | None = None
+    compared: str = "succeeded"
 
 
 def apart(rng: random.Random, count: int, low: Point, high: Point, least: float, downwash: float = 1.0) -> list[Point]:
@@ -124,6 +169,128 @@ def lsc(count: int) -> Callable[[int], Scene]:
         )
 
     return scene
+
+
+def forest(seed: int) -> Scene:
+    """The random forest of LSC: 20 agents change places across a circle of 4 m, through ten columns.
+
+    The columns of the source's 30 maps have radii of 0.1 to 0.3 m. Their centres are in a square of 5 m, at least
+    1.2 m apart. Their tops are between 0.9 m and 3 m; here all are at 3 m. Each coordinate of a start and a goal is
+    moved by up to 5 cm, as in the source.
+    """
+    rng = random.Random(31_000 + seed)
+    ends = []
+    for turn in (0.0, math.pi):
+        angles = [2 * math.pi * i / 20 + turn for i in range(20)]
+        exact = [(4 * math.cos(a), 4 * math.sin(a), 1.0) for a in angles]
+        ends.append([(x + moved(rng, 0.05), y + moved(rng, 0.05), z + moved(rng, 0.05)) for x, y, z in exact])
+    centres = apart(rng, 10, (-2.5, -2.5, 0.0), (2.5, 2.5, 0.0), 1.2)
+    return dataclasses.replace(
+        lsc(20)(seed),
+        name="lsc-forest",
+        start_m=ends[0],
+        slots_m=ends[1],
+        columns=tuple((f"column {k + 1}", at, rng.uniform(0.1, 0.3)) for k, at in enumerate(centres)),
+    )
+
+
+def moved(rng: random.Random, most_m: float) -> float:
+    return rng.uniform(-most_m, most_m)
+
+
+# Ranges of the radio in the trials of R3R on a circle [m].
+R3R_RANGES_M = (1.0, 1.5, 2.0, 2.5, 3.0)
+
+
+def r3r_circle(count: int, limited: bool = True) -> Callable[[int], Scene]:
+    """The trial of R3R's baseline: agents change places across a circle of 2.5 m. The seed selects the range.
+
+    Without `limited` the range has no limit.
+    """
+
+    def scene(seed: int) -> Scene:
+        rng = random.Random(9000 * count + seed)
+        angles = [2 * math.pi * i / count for i in range(count)]
+        return Scene(
+            name=f"r3r-circle-{count}",
+            start_m=[(2.5 * math.cos(a) + moved(rng, 0.01), 2.5 * math.sin(a), 0.0) for a in angles],
+            slots_m=[(-2.5 * math.cos(a), -2.5 * math.sin(a), 0.0) for a in angles],
+            delta_m=0.5,
+            max_speed_m_s=1.0,
+            preferred_speed_m_s=1.0,
+            max_accel_m_s2=4.0,
+            reached_m=0.5,
+            duration_s=60.0,
+            sampled_hz=20.0,
+            dimensions=2,
+            radio_m=R3R_RANGES_M[seed] if limited else None,
+        )
+
+    return scene
+
+
+# Boxes of the map simple_indoor_1 in its image: left, right, top and bottom [pixels].
+INDOOR_PIXELS = (
+    (1116, 1217, 204, 304),
+    (275, 963, 346, 796),
+    (1116, 1817, 471, 796),
+    (1041, 1300, 929, 1221),
+    (1525, 1792, 962, 1192),
+    (462, 717, 1012, 1484),
+    (1216, 1838, 1404, 1809),
+    (250, 963, 1650, 1829),
+    (0, 2084, 0, 109),
+    (0, 2084, 1975, 2084),
+    (0, 109, 109, 1975),
+    (1975, 2084, 109, 1975),
+)
+
+
+def r3r_indoor(count: int) -> Callable[[int], Scene]:
+    """The indoor map of R3R: a square of 104.2 m with eight blocks and four walls, starts and goals 3 m from them.
+
+    The image of the map has 2084 pixels a side of 0.05 m each. The radius of planning in the source's pictures, 10.5 m
+    at a range of 32 m, has this scale too.
+    """
+    boxes = []
+    for k, (left, right, top, bottom) in enumerate(INDOOR_PIXELS):
+        at = (0.05 * (left + right) / 2, 0.05 * (2084 - (top + bottom) / 2), 0.0)
+        boxes.append((f"block {k + 1}", at, (0.05 * (right - left), 0.05 * (bottom - top), 10.0)))
+
+    def draw(rng: random.Random) -> list[Point]:
+        drawn: list[Point] = []
+        while len(drawn) < count:
+            point = (rng.uniform(1.0, 103.2), rng.uniform(1.0, 103.2), 0.0)
+            free = all(distance_to_box(point, at, size) >= 3 for _, at, size in boxes)
+            if free and all(math.dist(point, other) >= 1 for other in drawn):
+                drawn.append(point)
+        return drawn
+
+    def scene(seed: int) -> Scene:
+        rng = random.Random(11_000 * count + seed)
+        return Scene(
+            name=f"r3r-indoor-{count}",
+            start_m=draw(rng),
+            slots_m=draw(rng),
+            delta_m=0.5,
+            max_speed_m_s=1.0,
+            preferred_speed_m_s=1.0,
+            max_accel_m_s2=2.0,
+            reached_m=0.51,
+            duration_s=370.0,
+            sampled_hz=5.0,
+            dimensions=2,
+            dt_s=0.05,
+            boxes=tuple(boxes),
+            radio_m=32.0,
+        )
+
+    return scene
+
+
+def distance_to_box(point: Point, at: Point, size: Point) -> float:
+    """Returns the distance of a point from an upright box [m], 0 inside."""
+    return math.hypot(*(max(0.0, abs(x - c) - s / 2) for x, c, s in zip(point, at, size, strict=True)))
 
 
 def gcbf(count: int) -> Callable[[int], Scene]:
@@ -255,14 +422,107 @@ def swap(seed: int) -> Scene:
 
 def missions(quick: bool, seeds: int) -> list[Mission]:
     """Returns the missions with the number of seeds of each. `quick` is one of the two smallest."""
-    lsc_source = "qwerty35/lsc_planner f4d4caf, missions/empty, launch/testall_empty.launch"
+    lsc_source = "qwerty35/lsc_planner f4d4caf, missions/empty, launch/testall_empty.launch; rate: arXiv:2109.09041"
+    forest_source = "qwerty35/lsc_planner f4d4caf, missions/forest, world/forest; rate: arXiv:2109.09041"
     gcbf_source = "MIT-REALM/gcbfplus 5e7d5cd, gcbfplus/env/double_integrator.py, README.md (test command)"
-    lsc_changes = "acceleration: norm at most 2 m/s^2 (files: 2, 2, 1 by axis); speed: norm; 60 s"
+    r3r = "MarshallVielmetti/r3r_decentralized_gatekeeper 08e5dbd"
+    r3r_circle_source = f"{r3r}, examples/nmpc_performance_graphs.jl, examples/ipopt_baseline_utils.jl"
+    r3r_indoor_source = (
+        f"{r3r}, examples/r3r_evolution_simple_indoor.jl; dev10110/OccupancyGrids.jl 092452e, maps/simple_indoor_1; "
+        "rate: abstract of arXiv:2510.06436v1"
+    )
+    lsc_changes = (
+        "acceleration: norm at most 2 m/s^2 (files: 2, 2, 1 by axis); speed: norm; 60 s; no bounds of the space"
+    )
+    forest_changes = lsc_changes + "; all columns 3 m high"
     gcbf_changes = "norms in place of limits by axis; no obstacles; 60 s in place of 7.68 s"
     rvo_changes = "commands up to 5 m/s^2 in place of velocities taken at once; starts moved by up to 1 cm"
+    dubins = "points that may stop in place of Dubins vehicles, with commands up to speed^2 / turning radius. "
+    stay = "Vehicles stay at their goals. 60 s in place of 10 s; starts moved by up to 1 cm. "
+    r3r_circle_changes = (
+        dubins + stay + "One flight for each range of the radio: 1, 1.5, 2, 2.5 and 3 m. The radio carries the "
+        "messages of the shield and of the displacement law; the other laws sense neighbours"
+    )
+    r3r_indoor_changes = (
+        dubins + "All vehicles are there from start to end; in the source, a vehicle joins when it has a plan, and "
+        "leaves at its goal. Starts at least 1 m apart, goals too; no planner of paths; 370 s"
+    )
+    lsc_published = "no collision; most successes of four planners (values in a figure only)"
+    lsc_why = "Here the space has no bounds, and commands change at 20 Hz or more (source: plans at 5 Hz)"
+    nmpc = "NMPC, the baseline of R3R: no collision at {} of 5 ranges"
+    nmpc_why = (
+        "NMPC has no guarantee. The figure of its rate is beside this trial and names no method. Arrivals under the "
+        "shield need the range: pairs beyond it keep their last plane, and vehicles wait behind it"
+    )
+    r3r_published = "R3R: 100 % safety, up to 128 agents; we found no public text with its arrivals"
+    r3r_why = (
+        "The rate of safety comes back under the shield, but no flight arrives: laws fly straight to their slots and "
+        "stop at walls, where R3R plans paths"
+    )
     listed = [
-        Mission(f"LSC, {n} agents", lsc_source, "never unsafe, each within 0.1 m", lsc_changes, lsc(n), seeds, n == 10)
+        Mission(
+            f"LSC, {n} agents",
+            lsc_source,
+            "never unsafe, each within 0.1 m",
+            lsc_changes,
+            lsc(n),
+            seeds,
+            n == 10,
+            published=f"LSC: {lsc_published}",
+            why=lsc_why,
+        )
         for n in (10, 20, 30, 40, 50, 60)
+    ]
+    listed.append(
+        Mission(
+            "LSC forest, 20 agents",
+            forest_source,
+            "never unsafe, each within 0.1 m",
+            forest_changes,
+            forest,
+            seeds,
+            published="LSC: 100 %; EGO-Swarm: 50 % (30 flights each)",
+            why="The rate comes back under the shield. Without it, no law here avoids columns and arrives",
+        )
+    )
+    listed += [
+        Mission(
+            f"R3R circle, {n} agents",
+            r3r_circle_source,
+            "never unsafe, each within 0.5 m",
+            r3r_circle_changes,
+            r3r_circle(n),
+            len(R3R_RANGES_M),
+            published=nmpc.format(rate),
+            why=nmpc_why,
+            compared="safe",
+        )
+        for n, rate in ((2, 5), (4, 5), (8, 4), (16, 0))
+    ]
+    listed += [
+        Mission(
+            f"R3R circle without a limit of the range, {n} agents",
+            r3r_circle_source,
+            "never unsafe, each within 0.5 m",
+            dubins + stay + "No radio",
+            r3r_circle(n, limited=False),
+            len(R3R_RANGES_M),
+        )
+        for n in (8, 16)
+    ]
+    listed += [
+        Mission(
+            f"R3R indoor, {n} agents",
+            r3r_indoor_source,
+            "never unsafe, each within 0.51 m",
+            r3r_indoor_changes,
+            r3r_indoor(n),
+            min(seeds, 5),
+            published=r3r_published,
+            why=r3r_why,
+            compared="safe",
+        )
+        for n in (32, 64, 128)
     ]
     listed += [
         Mission(f"GCBF+, {n} agents", gcbf_source, "never unsafe, each within 0.1 m", gcbf_changes, gcbf(n), seeds)

@@ -142,6 +142,41 @@ class Twins(InFolder):
         self.assertTrue(missions.seen(blocks, [(8.5, 25.0, 0.0)]))
         self.assertFalse(missions.seen(blocks, [(7.5, 25.0, 0.0)]))
 
+    def test_a_sample_near_a_column_shows_a_collision(self):
+        forest = scenes.forest(0)
+        _, (x, y, _), radius_m = forest.columns[0]
+        self.assertTrue(missions.seen(forest, [(x + radius_m + 0.14, y, 1.0)]))
+        self.assertFalse(missions.seen(forest, [(x + radius_m + 0.16, y, 1.0)]))
+        self.assertFalse(missions.seen(forest, [(x, y, 3.0 + radius_m + 0.16)]))
+
+    def test_a_scene_for_balls_has_the_separations_and_keeps_the_limits_of_its_ellipsoids(self):
+        for scene in (scenes.lsc(10)(0), scenes.swap(0)):
+            balls = scene.as_balls()
+            squash = scene.half_axes_m[0] / scene.half_axes_m[2]
+            for height_m, expected in ((1.98, True), (2.02, False)):
+                sample = [(0.0, 0.0, 0.0), (0.0, 0.0, height_m * scene.half_axes_m[2])]
+                self.assertEqual(missions.seen(scene, sample), expected)
+                self.assertEqual(missions.seen(balls, [(x, y, z * squash) for x, y, z in sample]), expected)
+            self.assertAlmostEqual(balls.max_speed_m_s / squash, scene.max_speed_m_s)
+            self.assertAlmostEqual(balls.max_accel_m_s2 / squash, scene.max_accel_m_s2)
+            self.assertNotIn("[safety]", balls.text("orca", False))
+        circle = scenes.circle(0)
+        self.assertIs(circle.as_balls(), circle)
+
+    def test_indoor_starts_and_goals_keep_the_distance_of_the_source_from_blocks(self):
+        for scene in (scenes.r3r_indoor(32)(0), scenes.r3r_indoor(128)(1)):
+            for point in (*scene.start_m, *scene.slots_m):
+                nearest_m = min(scenes.distance_to_box(point, at, size) for _, at, size in scene.boxes)
+                self.assertGreaterEqual(nearest_m, 3.0)
+            self.assertTrue(missions.seen(scene, [scene.boxes[1][1]]))
+
+    def test_each_flight_on_the_circle_of_r3r_has_its_range(self):
+        ranges = [f"range_m = {scenes.r3r_circle(4)(seed).radio_m}" for seed in range(5)]
+        self.assertEqual(ranges, [f"range_m = {x}" for x in (1.0, 1.5, 2.0, 2.5, 3.0)])
+        for seed, line in enumerate(ranges):
+            self.assertIn(line, scenes.r3r_circle(4)(seed).text("bvc", True))
+        self.assertNotIn("[network]", scenes.lsc(10)(0).text("bvc", True))
+
     def test_only_samples_on_the_grid_show_a_collision(self):
         scene = scenes.circle(0)  # checks at 4 Hz, limit 3 m
         near, far = [(0.0, 0.0, 0.0), (2.9, 0.0, 0.0)], [(0.0, 0.0, 0.0), (3.1, 0.0, 0.0)]
@@ -237,6 +272,35 @@ class Page(unittest.TestCase):
         between = page.totals([row | {"ended_between": 2}])
         self.assertTrue(between.startswith(counts + " 2 flights ended at the limit between two samples."), between)
 
+    def test_a_cell_names_other_numbers_of_flights_and_collisions(self):
+        row = {"flights": 30, "succeeded": 29, "collided": 0, "hidden": 0}
+        few, ball = row | {"flights": 5, "succeeded": 5}, row | {"as_balls": True}
+        hit = row | {"collided": 3, "hidden": 1}
+        for bare, shielded, text in (
+            (row, row, "29/29"),
+            (None, row, "-/29"),
+            (ball, row, "29*/29"),
+            (few, few, "5/5 of 5"),
+            (few, row, "5/29 of 5/30"),
+            (hit, row, "29/29 (3/0, 1 hidden)"),
+            (None, hit | {"hidden": 0}, "-/29 (-/3)"),
+            (None, None, "-/-"),
+        ):
+            self.assertEqual(page.cell(bare, shielded, 30), text)
+
+    def test_the_best_laws_are_those_with_the_largest_share(self):
+        rows = [
+            {"law": law, "compared": "succeeded", "succeeded": count, "safe": 0, "flights": flights}
+            for law, count, flights in (("orca", 5, 10), ("bvc", 2, 3), ("bvc", 2, 3), ("cbf-qp", 4, 6))
+        ]
+        self.assertEqual(page.best(rows), "4 of 6 succeeded (bvc, cbf-qp)")
+        self.assertEqual(page.best(rows[:2]), "2 of 3 succeeded (bvc)")
+        tied = [rows[1], rows[3]]
+        self.assertEqual(page.best(tied), "2 of 3 succeeded (bvc); 4 of 6 succeeded (cbf-qp)")
+        clear = [row | {"compared": "safe", "safe": row["flights"]} for row in rows[:1]]
+        self.assertEqual(page.best(clear), "10 of 10 clear (orca)")
+        self.assertEqual(page.best([]), "-")
+
     def test_a_report_gives_the_text_of_a_page(self):
         spread = {"rounds": 5, "smallest_ratio": 1.5, "ratio": 2.0, "largest_ratio": 2.5}
         graph = speed_row(
@@ -260,8 +324,11 @@ class Page(unittest.TestCase):
         flight |= {"source": "owner/name abcdef0", "success": "each within 1 m", "changes": "none", "why": None}
         flight |= {"status": "measured", "flights": 4, "succeeded": 1, "reached": 2, "collided": 3, "hidden": 1}
         flight |= {"ended_between": 1, "least_m": 0.9, "delta_m": 1.0, "median_s": 2.0, "wall_s": 0.1}
+        flight |= {"as_balls": True, "published": "100 %", "why_other_rate": "no planner", "compared": "succeeded"}
+        shielded = flight | {"shield": True, "as_balls": False, "flights": 2, "succeeded": 2, "collided": 0}
+        shielded |= {"hidden": 0, "ended_between": 0}
         skipped = {"group": "missions", "name": "Ring, 3/laplacian", "status": "skipped", "why": "no slots"}
-        report = run.EMPTY | {"program": "tautline 1.0", "rows": [graph, flown, motion, flight, skipped]}
+        report = run.EMPTY | {"program": "tautline 1.0", "rows": [graph, flown, motion, flight, shielded, skipped]}
         found = page.replace(f"before\n{page.BEGIN}\nSTALE\n{page.END}\nafter\n", report)
         expected = (ROOT / "tests/ci/benchmarks_page.md").read_text()
         self.assertEqual(found, expected)
