@@ -163,8 +163,8 @@ pub(super) struct AuditArguments {
     #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', requires = "html")]
     #[arg(value_parser = ["svg", "pdf", "png"])]
     figures: Vec<String>,
-    /// Write a proof of the verdict that `check_proof.py` checks in exact arithmetic without this program; only for a
-    /// CSV table with --delta.
+    /// Write a proof of the verdict that `check_proof.py` checks in exact arithmetic without this program; for a CSV
+    /// table, a flight with each step, or curves, and most limits.
     #[arg(long, value_name = "FILE")]
     proof: Option<PathBuf>,
     /// Write a summary in Markdown, for example for the page of a job.

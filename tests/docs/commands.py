@@ -10,7 +10,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from exceptions import INSTEAD, LONG, NOT_RUN, NOT_RUN_HERE, RUN
+from exceptions import INSTEAD, LONG, NOT_RUN, NOT_RUN_HERE, RUN, RUN_ALSO
 from pages import ROOT, Block, Page
 
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
@@ -74,7 +74,7 @@ def as_run(command: Command) -> str | None:
         return shlex.quote(str(TARGET / INSTEAD[text]))
     if found := re.fullmatch(r"cargo run --release(?: -- (.*))?", text):
         return f"tautline {found[1] or ''}".strip()
-    return text if command.program in RUN | {"tautline"} else None
+    return text if command.program in RUN | {"tautline"} or text.startswith(RUN_ALSO) else None
 
 
 def listed(table: dict[tuple[str, str], str], command: Command) -> bool:

@@ -5,6 +5,9 @@ from __future__ import annotations
 # Programs other than tautline that the tests run.
 RUN = {"cat", "cp"}
 
+# Beginnings of further commands that the tests run.
+RUN_ALSO = ("python3 check_proof.py",)
+
 # Programs that the tests do not run. Calls of tautline in their arguments are checked all the same.
 NOT_RUN = {
     "cargo": "builds; its targets are looked for in the tree",
@@ -14,7 +17,7 @@ NOT_RUN = {
     "git": "shows the reader's changes, or copies another project",
     "pip": "tests/setup.sh installs what the tests need",
     "python": "runs the driver of a cluster or benchmarks; tests/cluster and tests/ci run them",
-    "python3": "runs these tests",
+    "python3": "runs these tests, or a script of RUN_ALSO",
     "ray": "starts a cluster; tests/cluster starts one",
     "sbatch": "submits to Slurm; tests/cluster does",
     "sh": "sets up and runs all tests, or changes the sources",

@@ -15,12 +15,14 @@ FLIGHT = "tautline run pentagon --set time.duration_s=10 --out out/short --quiet
 
 # Page: files that it needs.
 NEEDED_BY = {
+    "docs/checkable-proofs.md": ["check_proof.py"],
     "docs/ci.md": ["flights"],
     "docs/viewer.md": ["out/pentagon", "flight.csv"],
 }
 
 # File or folder: commands that create it. Exit code 1 is allowed: a flight of 10 s does not reach its formation.
 MADE_BY = {
+    "check_proof.py": [f"cp {ROOT}/python/tautline/check_proof.py ."],
     "out/pentagon": [PENTAGON],
     "flight.csv": [FLIGHT, "tautline export out/short -o flight.csv"],
     "flights": [

@@ -85,6 +85,8 @@ class Exceptions(unittest.TestCase):
         called = [command for block in blocks if block.language == "sh" for command in commands(block)]
         for page, begin in [*exceptions.NOT_RUN_HERE, *exceptions.LONG]:
             self.assertTrue(any(one.page == page and one.text.startswith(begin) for one in called), (page, begin))
+        for begin in exceptions.RUN_ALSO:
+            self.assertTrue(any(one.text.startswith(begin) for one in called), begin)
         for command in exceptions.INSTEAD:
             self.assertTrue(any(one.text == command for one in called), command)
         for program in [*exceptions.NOT_RUN, *exceptions.RUN]:

@@ -132,6 +132,12 @@ impl Fence {
         Ok(())
     }
 
+    /// Returns whether the fence is one polygon that vehicles must stay inside of.
+    #[must_use]
+    pub fn is_single_inclusion(&self) -> bool {
+        self.more.is_empty() && !self.is_exclusion
+    }
+
     /// Distance that vehicles must keep from the fence \[m\].
     #[must_use]
     pub fn margin_m(&self) -> f64 {

@@ -158,7 +158,7 @@ impl ConfiguredAudit<'_> {
         let side_obstacles = settings.obstacles.len();
         let taken = RecordedLimits::fill(&mut settings, request, own.as_ref());
         notes.extend(taken.notes(request, own.as_ref()));
-        proof::check(request, &settings)?;
+        proof::check(request, &settings, own.as_ref())?;
         against_plan::refuse_changed_positions(request)?;
         let opening = Opening::read(&|| request.subject.open(), monitor)?;
         let side_files = opening.align(&mut settings, side_obstacles)?;
@@ -284,7 +284,7 @@ impl ConfiguredAudit<'_> {
     ) -> Result<(), Failure> {
         let request = &self.request;
         let open: &Open<'_> = &|| request.subject.open();
-        let JudgedRecording { settings, outcome, instants, .. } = judged;
+        let JudgedRecording { settings, own, outcome, instants, .. } = judged;
         if let Some((html, instants)) = request.html.as_ref().zip(instants) {
             let (replay, mut figures) = replays::of_recording(open, monitor, &settings, &outcome, report, instants)?;
             figures.extend(plan_figure);
@@ -301,10 +301,10 @@ impl ConfiguredAudit<'_> {
             }
             monitor.say(&format!("wrote {written}"));
         }
-        if let Some((file, (path, _))) = request.proof.as_ref().zip(request.subject.only_file()) {
-            let recording = &report.source.recording;
-            let judged = (&settings, &outcome, report.is_decimal_tie);
-            let refused = proof::write(file, path, recording, judged, &report.source.clock)?;
+        if let Some(file) = &request.proof {
+            let (recording, clock) = (&report.source.recording, &report.source.clock);
+            let judged = (&settings, own.as_ref(), &outcome, report.is_decimal_tie);
+            let refused = proof::write(file, request, recording, judged, clock)?;
             match refused {
                 Some(why) => tell(monitor, &[why]),
                 None => monitor.say(&format!("wrote {}", file.display())),

@@ -192,6 +192,11 @@ impl OwnRecording {
         self.run_audit().is_some()
     }
 
+    /// Returns whether positions and times are read unchanged.
+    pub(super) fn is_read_as_written(&self) -> bool {
+        self.is_read_as_written
+    }
+
     /// Returns whether the samples are all steps of the run, each with straight motion.
     pub(crate) fn holds_every_step(&self) -> bool {
         self.run_audit().is_some_and(|audit| audit.holds_every_step)

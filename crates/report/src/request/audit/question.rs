@@ -28,7 +28,8 @@ pub struct AuditRequest<'a> {
     pub html: Option<PathBuf>,
     /// Formats of the files of figures, in the folder `NAME-figures` beside the page `NAME.html`.
     pub formats: Vec<FigureFormat>,
-    /// Path of the proof, which `check_proof.py` confirms. Available for one CSV table and a safety distance alone.
+    /// Path of the proof, which `check_proof.py` confirms. Available for a CSV table, a flight with each step and
+    /// curves, and for most limits.
     pub proof: Option<PathBuf>,
 }
 

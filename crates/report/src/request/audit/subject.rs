@@ -52,17 +52,6 @@ impl Subject<'_> {
         }
     }
 
-    /// Returns the path and the options if the recording is a single file.
-    pub(super) fn only_file(&self) -> Option<(&Path, &ReadOptions)> {
-        match self {
-            Self::Files { paths, options } => match &paths[..] {
-                [path] => Some((path, options)),
-                _ => None,
-            },
-            Self::InMemory { .. } => None,
-        }
-    }
-
     pub(super) fn paths(&self) -> &[PathBuf] {
         match self {
             Self::Files { paths, .. } => paths,
