@@ -76,13 +76,17 @@ def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
             return entry | {"status": "skipped", "why": str(refusal)}
         status = report["status"]
         reached = bool(report["formation"]["reached"])
+        if scene.goals_m:
+            _, last = program.samples()[-1]
+            reached = all(math.dist(a, b) <= scene.reached_m for a, b in zip(last, scene.goals_m, strict=True))
         counts["flights"] += 1
         counts["safe"] += status == "clear"
         counts["undecided"] += status == "undecided"
         counts["reached"] += reached
         counts["succeeded"] += status == "clear" and reached
-        if status == "clear" and reached:
-            times.append(report["formation"]["reached_at_s"])
+        at_s = report["formation"]["reached_at_s"]
+        if status == "clear" and reached and at_s is not None:
+            times.append(at_s)
         if status == "violation":
             counts["collided"] += 1
             unseen = how_unseen(scene, program.samples(), report["run"]["ended_early"] is not None)

@@ -1,5 +1,5 @@
 //! Prints the table of arrivals, which docs/shield.md shows in part: laws without and under the shield, and behind a
-//! radio that loses messages, from random starts of several kinds.
+//! radio that loses messages, from random starts of several kinds. Then arrivals with short ranges of the radio.
 //!
 //! `cargo run --release --example arrivals [RUNS [LAW...]]`, 20 runs of each law by default.
 
@@ -36,6 +36,9 @@ const COMMON: &str = "
 ";
 /// Radio with latency and with losses in bursts.
 const RADIO: [&str; 1] = ["network={rate_hz=20, latency_s=0.1, loss=0.3, loss_burst=3}"];
+
+/// Ranges of the radio \[m\], each with the largest number of hops of a message.
+const RANGES: [(u32, u32); 5] = [(40, 1), (15, 1), (10, 1), (10, 8), (7, 8)];
 
 /// Vehicles on a circle that change places with those opposite, with a jitter of 0.1 m.
 fn circle(count: usize, radius_m: f64) -> Kind {
@@ -144,5 +147,19 @@ fn main() {
             cell(&radio, |row| row.reached.count.to_string()),
             cell(&radio, median),
         );
+    }
+    ranges(runs);
+}
+
+/// Prints how many flights of 20 vehicles under `cbf-qp` and the shield arrive with a range of the radio.
+fn ranges(runs: u64) {
+    println!("\nReached by cbf-qp under the shield, {}:\n", random(20, 2.4, 10.0, 2).name);
+    println!("| range [m] | hops | reach | median [s] |\n| --- | --- | --- | --- |");
+    for (range_m, hops) in RANGES {
+        let radio = format!("network={{rate_hz=20, range_m={range_m}, relay_hops={hops}}}");
+        let rows = compared(&random(20, 2.4, 10.0, 2), &["cbf-qp+shield".to_owned()], &[&radio], runs);
+        let Some(row) = rows.first() else { continue };
+        let median = row.reached_median_s.value.map_or("-".to_owned(), |at_s| format!("{at_s:.0}"));
+        println!("| {range_m} | {hops} | {} of {runs} | {median} |", row.reached.count);
     }
 }

@@ -10,9 +10,9 @@
 set -eu
 cd "$(dirname "$0")/.."
 
-change="crates ignored bits film proofs ci cluster docs readers python"
+change="crates ignored bits proofs ci cluster docs readers python"
 # These compile all crates again.
-all="$change fuzz mutants"
+all="$change film fuzz mutants"
 # The Python package and the fuzz targets have tests of their own.
 rust="--workspace --exclude tautline-python --exclude tautline-fuzz"
 
