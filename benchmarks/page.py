@@ -44,9 +44,8 @@ LAWS = (
     "A flight under the displacement law ends at the limit, so its smallest separation is just below the limit. This "
     "law has no limit on speed; its gains keep a lone vehicle below the limit. `orca` and `cbf-qp` have their default "
     "gains; those of `bvc` and `cbf-qp braking` arrived soonest of five choices over other seeds. The shield holds "
-    "commands for 0.05 s, too long for the displacement law on the complete graph of 40 vehicles or more in LSC. Only "
-    "the displacement law and the shield avoid blocks, walls and columns. RVO2 has no limit on acceleration: its own "
-    "method may succeed where `orca` collides."
+    "commands for 0.05 s, or less if the displacement law needs it. Only the displacement law and the shield avoid "
+    "blocks, walls and columns. RVO2 has no limit on acceleration: its own method may succeed where `orca` collides."
 )
 PUBLISHED = "Published rates of the sources' own methods beside the best laws here, over all flights of a row:"
 SAMPLING = (

@@ -38,6 +38,7 @@ class Scene:
     boxes: tuple[tuple[str, Point, Point], ...] = ()
     columns: tuple[tuple[str, Point, float], ...] = ()
     radio_m: float | None = None
+    relay_hops: int = 1
     goals_m: list[Point] | None = None
 
     def as_balls(self) -> "Scene":
@@ -100,7 +101,7 @@ class Scene:
         if self.half_axes_m:
             tables["safety"] = {"shape": "ellipsoid", "half_axes_m": str(list(self.half_axes_m))}
         if self.radio_m:
-            tables["network"] = {"range_m": self.radio_m, "rate_hz": 20.0}
+            tables["network"] = {"range_m": self.radio_m, "rate_hz": 20.0, "relay_hops": self.relay_hops}
         if shield:
             tables["shield"] = {"max_speed_m_s": self.max_speed_m_s}
         rest = ""
@@ -204,10 +205,10 @@ def moved(rng: random.Random, most_m: float) -> float:
 R3R_RANGES_M = (1.0, 1.5, 2.0, 2.5, 3.0)
 
 
-def r3r_circle(count: int, limited: bool = True) -> Callable[[int], Scene]:
+def r3r_circle(count: int, limited: bool = True, relay_hops: int = 1) -> Callable[[int], Scene]:
     """The trial of R3R's baseline: agents change places across a circle of 2.5 m. The seed selects the range.
 
-    Without `limited` the range has no limit.
+    Without `limited` the range has no limit. Messages take at most `relay_hops` hops.
     """
 
     def scene(seed: int) -> Scene:
@@ -226,6 +227,7 @@ def r3r_circle(count: int, limited: bool = True) -> Callable[[int], Scene]:
             sampled_hz=20.0,
             dimensions=2,
             radio_m=R3R_RANGES_M[seed] if limited else None,
+            relay_hops=relay_hops,
         )
 
     return scene
@@ -511,6 +513,17 @@ def missions(quick: bool, seeds: int) -> list[Mission]:
             "never unsafe, each within 0.5 m",
             dubins + stay + "No radio",
             r3r_circle(n, limited=False),
+            len(R3R_RANGES_M),
+        )
+        for n in (8, 16)
+    ]
+    listed += [
+        Mission(
+            f"R3R circle with relays, {n} agents",
+            r3r_circle_source,
+            "never unsafe, each within 0.5 m",
+            r3r_circle_changes + ". Vehicles pass on messages, up to 8 hops",
+            r3r_circle(n, relay_hops=8),
             len(R3R_RANGES_M),
         )
         for n in (8, 16)

@@ -400,7 +400,9 @@ mod tests {
             let choice = Choice::GiveWay { ease_m: 0.2, turn };
             let chosen = |vehicles: &[Plane], obstacles: &[Plane], wish: Vector3<f64>| {
                 let mut reach = Reach::default();
-                vehicles.iter().for_each(|plane| reach.push(*plane));
+                for plane in vehicles {
+                    reach.push(*plane);
+                }
                 reach.push_obstacles(obstacles.iter().copied());
                 reach.choose(&envelope, &state, wish, choice).acceleration
             };
