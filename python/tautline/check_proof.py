@@ -563,27 +563,30 @@ class Run:
         count = f"{len(self.steps)} samples"
         self.facts = [f"samples: {count}, {'of successive steps of the run' if is_whole else 'not of each step'}"]
 
-    def take(self, fields: Fields) -> None:
+    def take(self, fields: Fields, is_chunk: bool = False) -> None:
+        has_ended = False
         for kind, record in fields.records():
+            if has_ended or (is_chunk and kind in (self.CHUNK, self.FOOTER)):
+                raise Unreadable("data: must have one footer, at the end, and no chunk in a chunk")
             if kind == self.CHUNK:
                 record.take(8 + 8 + 8 + 4)
                 if record.text():
                     raise Unreadable("data: must have no compressed chunk")
-                self.take(Fields(record.take(record.number(8))))
+                self.take(Fields(record.take(record.number(8))), is_chunk=True)
             elif kind == self.SCHEMA:
                 schema = record.number(2)
-                self.schemas[schema] = record.text()
+                self.schemas[schema] = f"{record.text()} {record.text()}"
             elif kind == self.CHANNEL:
                 channel, schema, topic = record.number(2), record.number(2), record.text()
                 if topic == "/swarm":
-                    self.channels[channel] = self.schemas.get(schema, "")
+                    self.channels[channel] = f"{self.schemas.get(schema, '')} {record.text()}"
             elif kind == self.MESSAGE and record.number(2) in self.channels:
                 record.take(4 + 8 + 8)
                 self.sample(record)
             elif kind == self.FOOTER:
-                break
-        if [*self.channels.values()] not in ([], ["tautline_msgs/msg/Swarm"]):
-            raise Unreadable("data: must have one channel /swarm with messages tautline_msgs/msg/Swarm")
+                has_ended = True
+        if [*self.channels.values()] not in ([], ["tautline_msgs/msg/Swarm ros2msg cdr"]):
+            raise Unreadable("data: must have one channel /swarm with messages tautline_msgs/msg/Swarm in CDR")
 
     def sample(self, record: Fields) -> None:
         if record.take(4)[:2] != b"\x00\x01":
@@ -663,9 +666,12 @@ class Piece:
         self.corners = [*zip(*map(bernstein, self.over(from_s, to_s)))]
         self.low, self.high = ([least(axis) for axis in zip(*self.corners)] for least in (min, max))
 
+    def is_jump(self) -> bool:
+        return self.from_s == self.to_s
+
     def over(self, from_s: Fraction, to_s: Fraction) -> list[list[Fraction]]:
         """Polynomials in the share of an interval within the piece."""
-        if self.from_s == self.to_s:
+        if self.is_jump():
             return self.axes
         return [substituted(axis, from_s - self.from_s, to_s - from_s) for axis in self.axes]
 
@@ -778,7 +784,7 @@ class Curves:
         return track
 
     def facts(self) -> list[str]:
-        jumps = [math.dist(*piece.corners) for track in self.tracks for piece in track if piece.from_s == piece.to_s]
+        jumps = [math.dist(*piece.corners) for track in self.tracks for piece in track if piece.is_jump()]
         return [
             "clocks: all curves begin at the time 0 of one clock",
             "positions: lengths are in metres, in one frame, and times in seconds",
@@ -1151,16 +1157,20 @@ class Cylinder(PairLimit):
 
 
 def curve_meetings(first: list[Piece], second: list[Piece]) -> Iterator[tuple[Piece, Piece]]:
-    """Pieces of two vehicles that have a common time."""
+    """Pieces of two vehicles that have a common time. Where both jump at once, only the two jumps have it."""
+    both_jump = {a.from_s for a in first if a.is_jump()} & {b.from_s for b in second if b.is_jump()}
     begin = 0
     for a in first:
         while begin < len(second) and second[begin].to_s < a.from_s:
             begin += 1
-        for b in second[begin:]:
+        for number in range(begin, len(second)):
+            b = second[number]
             effort.spend()
             if b.from_s > a.to_s:
                 break
-            if b.to_s >= a.from_s:
+            from_s, to_s = max(a.from_s, b.from_s), min(a.to_s, b.to_s)
+            is_before_and_after = from_s == to_s and from_s in both_jump and not (a.is_jump() and b.is_jump())
+            if from_s <= to_s and not is_before_and_after:
                 yield a, b
 
 
@@ -1177,6 +1187,7 @@ def time_below(a: Piece, b: Piece, scales: list[Fraction], distance: Fraction) -
         for k, x in enumerate(by):
             for m, y in enumerate(by):
                 square[k + m] += x * y
+    effort.spend(len(square) ** 2)
     share = least_share(square)
     return None if share is None else from_s + (to_s - from_s) * share
 
@@ -1541,10 +1552,12 @@ class Fence(Limit):
             if limit > 0 and (shares or any(point_square(p, *line) < limit**2 for p, line in sides(a, b, *edge))):
                 return True
             crossings += shares
+        effort.spend(len(edges))
         if limit > 0:
             return not surrounds(edges, a)
         # Between two walls a path is inside or outside as a whole; along a wall it is inside.
         for begin, end in pairwise(sorted(crossings)):
+            effort.spend(2 * len(edges))
             place = [x + (y - x) * (begin + end) / 2 for x, y in zip(a, b)]
             if not surrounds(edges, place) and all(point_square(place, *edge) > 0 for edge in edges):
                 return True

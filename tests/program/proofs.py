@@ -803,6 +803,11 @@ class Limits(Case):
         wide = fence("clear", 41.0, [*large, *([-100, 100 - k / 1000] for k in range(1, 2000))], vehicle="v59")
         self.expect(CONFIRMED, text, with_limits(text, names, wide))
         self.expect(DENIED, text, with_limits(text, names, wide), "not decided by", "--effort", "10000")
+        # A path along the teeth of a wall meets all of them, and each part asks all edges.
+        teeth = [[k, -(k % 2) * 1e-9] for k in range(-200, 201)] + [[200, 90], [-200, 90]]
+        along = "t,id,x,y,z\n" + way((-199, 0, 0), (199, 0, 0))
+        comb = with_limits(along, "a", fence("clear", 0.0, teeth))
+        self.expect(DENIED, along, comb, "not decided by", "--effort", "50000")
         for words in (["--effort", "x"], ["--effort"]):
             self.assertEqual(run(proof, text, *words)[0], UNREADABLE)
 
@@ -888,6 +893,16 @@ class CurveCase(Case):
         far = math.sqrt(16 + 1)
         files = {"a": curve((2, [0])), "b": curve((1, [-4], [1]), (1, [4], [1]))}
         self.both(files, self.LIMIT | {"smallest": 1.0, "status": "violation"}, "at t = 1 s", smallest=far)
+
+    def test_jumps_of_both_vehicles_at_once_meet_only_each_other(self):
+        """a and b jump by 10 m together, 1.5 m apart; then through each other."""
+        files = {"a": curve((1, [0]), (1, [10])), "b": curve((1, [1.5]), (1, [11.5]))}
+        self.both(files, self.LIMIT | {"smallest": 1.5, "delta_m": 1.0}, "", smallest=0.0)
+        forged = self.LIMIT | {"status": "violation", "smallest": 0.0, "delta_m": 1.0}
+        self.expect(DENIED, [*files.values()], proof_of_curves(files, forged))
+        # They swap places: halfway they meet.
+        files["b"] = curve((1, [10]), (1, [0]))
+        self.both(files, self.LIMIT | {"status": "violation", "smallest": 0.0, "delta_m": 1.0}, "", smallest=1.0)
 
     def test_each_file_is_that_of_its_vehicle(self):
         proof = proof_of_curves(self.FILES, self.LIMIT)
@@ -1057,6 +1072,13 @@ class RunCase(Case):
             run_file(self.MESSAGES, topics=("/swarms", "/a")),
             run_file(self.MESSAGES, compression="lz4"),
             run_file([]),
+            # A record after the first footer, and a footer within a chunk, hide samples from some readers.
+            valid[:-37] + record(2, bytes(20)) + valid[-37:],
+            run_file([*self.MESSAGES[:2], b"", *self.MESSAGES[2:]]).replace(
+                record(5, b"\1\0", bytes(20)), record(2, bytes(20 + 2))
+            ),
+            valid.replace(string("cdr"), string("cdx")),
+            valid.replace(string("ros2msg"), string("ros1msg")),
             valid[:-8],
             valid[8:],
             valid + b"\0",

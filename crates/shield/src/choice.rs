@@ -246,7 +246,7 @@ impl Reach {
                 return Some(nearest);
             }
             let right = right_hand(wish - nearest);
-            let is_aside = right.dot(&wish) * turn < -ASIDE * right.norm_squared();
+            let is_aside = right.dot(&wish) * turn.signum() < -ASIDE * right.norm_squared();
             let turn = if is_aside && !meets_vehicle { -turn } else { turn };
             let turned = nearest + right * turn;
             self.hard.nearest_inside(envelope.cut(&state.velocity_m_s, turned), radius)

@@ -139,7 +139,8 @@ pub struct Settings {
     pub integration_error_m_s2: f64,
     /// Gap that two vehicles keep by choice \[m\]; default 0.2 of the safety distance.
     pub ease_m: Option<f64>,
-    /// Share of a cut command that is turned to the right, from -1 to 1; 0 for none.
+    /// Share of a cut command that is turned to the right, from -1 to 1; 0 for none. Before obstacles alone, a command
+    /// clearly to the other side is turned there.
     pub turn: f64,
     /// Whether vehicles stop before each other instead of giving way; `ease_m` and `turn` have no effect then.
     pub stop_only: bool,

@@ -63,9 +63,9 @@ const BYTES_PER_CONTRACT: u128 = 256;
 const BYTES_PER_MESSAGE: u128 = 64;
 
 /// Shield: changes commands of the law only where this is needed to certify that no two vehicles come closer than
-/// `law.delta_m`. Commands are held over the periods of `time.control_hz`; unless given 20 Hz, or a multiple of it that
-/// the law needs to be stable near its slots. Messages of the shield use the latency, loss and rate of `[network]`,
-/// between vehicles near their common plane.
+/// `law.delta_m`. Commands are held over the periods of `time.control_hz`. Its default is 20 Hz, or a multiple that the
+/// law needs to be stable near its slots, up to one command a step. Messages of the shield use the latency, loss and
+/// rate of `[network]`, between vehicles near their common plane.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShieldSpec {
@@ -132,6 +132,7 @@ pub struct ShieldSpec {
     #[schemars(extend("default" = 0.0, "minimum" = 0, "maximum" = 1))]
     pub hang_share: f64,
     /// Share of the removed part of a command that is added again to the right, from -1 to 1; negative for the left.
+    /// Before obstacles alone, a command clearly to the other side is turned there.
     #[schemars(extend("minimum" = -1, "maximum" = 1))]
     pub turn: f64,
 }
@@ -189,7 +190,7 @@ impl Scenario {
     /// Sets the rate of held commands: 20 Hz, or the smallest multiple that the law needs near its slots.
     ///
     /// The period is at most half of the longest one at which the linearised law is stable, and a whole number of
-    /// steps. With `sensing.rate_hz` the rate is 20 Hz.
+    /// steps: at least one, whatever the law needs. With `sensing.rate_hz` the rate is 20 Hz.
     pub(crate) fn choose_shield_rate(&mut self) {
         self.time.control_hz = Some(SHIELD_CONTROL_HZ);
         let steps = 1.0 / (SHIELD_CONTROL_HZ * self.time.dt_s);
@@ -201,7 +202,7 @@ impl Scenario {
         let steps = steps.round() as u32;
         let is_stable = |parts: &u32| 1.0 <= longest_s * SHIELD_CONTROL_HZ * f64::from(*parts);
         let parts = (1..=steps).filter(|parts| steps.is_multiple_of(*parts)).find(is_stable);
-        self.time.control_hz = parts.map(|parts| SHIELD_CONTROL_HZ * f64::from(parts)).or(self.time.control_hz);
+        self.time.control_hz = Some(SHIELD_CONTROL_HZ * f64::from(parts.unwrap_or(steps)));
     }
 
     /// Returns the settings of a table of the shield at a rate of commands \[Hz\].
@@ -418,7 +419,8 @@ impl Scenario {
     fn check_shield_memory(&self) -> Result<(), ScenarioError> {
         let pairs = self.count() as u128 * self.count().saturating_sub(1) as u128;
         let rate_hz = self.time.control_hz.unwrap_or_default();
-        let under_way = ((self.network.latency_s + self.network.jitter_s) * rate_hz).ceil() + 1.0;
+        let longest_s = (self.network.latency_s + self.network.jitter_s) * f64::from(self.network.hops());
+        let under_way = (longest_s * rate_hz).ceil() + 1.0;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "more than 1; too many saturate")]
         let bytes = pairs.saturating_mul(BYTES_PER_CONTRACT + BYTES_PER_MESSAGE * under_way as u128);
         if bytes <= MAX_MEMORY_BYTES {

@@ -173,7 +173,7 @@ fn vehicles_pass_on_messages_up_to_the_largest_number_of_hops() {
             assert!((found_s - expected_s).abs() < 1e-9, "{relay_hops:?} {receiver}: {found_s}");
         }
     }
-    // A message under way does not go on through a link that is down, or a vehicle that is silent.
+    // The path is that of the time of sending: no link that is down then, and no vehicle that is silent then.
     scenario.network.relay_hops = Some(3);
     scenario.failures = vec![Failure { vehicle: 3, at_s: 0.3, kind: FailureKind::Silent {} }];
     assert!((known_s(&scenario, 3, 50) - 0.29).abs() < 1e-9);

@@ -531,8 +531,9 @@ fn the_default_period_is_one_that_the_law_tolerates() {
     assert_eq!(rate_hz(40, "control_hz = 20\n[shield]"), Some(20.0));
     assert_eq!(rate_hz(40, "[sensing]\nrate_hz = 20\n[shield]"), Some(20.0));
     assert_eq!(rate_hz(40, ""), None);
-    // No rate of whole steps is enough for such a law.
+    // A law that needs more than one command a step gets one.
     assert_eq!(rate_hz(40, "dt_s = 0.05\n[shield]"), Some(20.0));
+    assert_eq!(rate_hz(400, "dt_s = 0.0125\n[shield]"), Some(80.0));
     // At the default rate, vehicles come to rest in their slots. At 20 Hz they go on shaking.
     let [chosen, fixed] = ["[shield]", "control_hz = 20\n[shield]"].map(|more| fly(&lattice(60, more)).0);
     let moved_m = |flight: &tautline_sim::sim::Flight| flight.last.velocities_m_s.amax();
