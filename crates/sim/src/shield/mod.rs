@@ -198,6 +198,10 @@ impl Scenario {
         let Some(law) = self.law().ok().filter(|_| is_free && steps < MOST_STEPS) else { return };
         let Some(linear) = law.linear(self.formation()) else { return };
         let longest_s = PERIOD_SHARE * linear.sampling_margin_s(self.velocity_coefficient_per_s());
+        if longest_s <= 0.0 {
+            // No period is known to be short enough.
+            return;
+        }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1, below MOST_STEPS")]
         let steps = steps.round() as u32;
         let is_stable = |parts: &u32| 1.0 <= longest_s * SHIELD_CONTROL_HZ * f64::from(*parts);
