@@ -226,8 +226,9 @@ impl Scenario {
         }
         let count = self.count() as u128;
         let pairs = count * count.saturating_sub(1);
-        let received =
-            if self.network.near == NearStates::Received { pairs } else { 2 * self.graph.edge_count() as u128 };
+        // With a relay, any two vehicles have a link.
+        let has_all = self.network.near == NearStates::Received || self.network.hops() > 1;
+        let received = if has_all { pairs } else { 2 * self.graph.edge_count() as u128 };
         let longest_s = (self.network.latency_s + self.network.jitter_s) * f64::from(self.network.hops());
         let under_way = (longest_s * rate_hz).ceil() + 2.0;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "more than 2; too many saturate")]

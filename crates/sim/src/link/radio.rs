@@ -66,7 +66,8 @@ pub(crate) struct Radio<T> {
     used_for: RadioUse,
     down: Vec<LinkOutage>,
     silent_from_s: Vec<f64>,
-    /// Whether the last message on each link was lost; `None` before the first.
+    /// Whether the last message on each link was lost; `None` before the first. With a relay, any two vehicles have a
+    /// link in each direction.
     lost_before: Vec<Option<bool>>,
     sent: u64,
     lost: u64,
@@ -83,7 +84,9 @@ impl<T> Radio<T> {
     /// Returns the radio of a scenario with this number of directed links.
     pub(crate) fn new(scenario: &Scenario, links: usize, used_for: RadioUse) -> Self {
         let NetworkSpec { latency_s, jitter_s, loss, loss_burst, range_m, .. } = scenario.network;
-        let (count, hops) = (scenario.count(), scenario.network.hops());
+        let count = scenario.count();
+        // A path visits each vehicle at most once.
+        let hops = scenario.network.hops().min(u32::try_from(count).unwrap_or(u32::MAX).saturating_sub(1));
         let index = |number: u64| usize::try_from(number.saturating_sub(1)).unwrap_or(usize::MAX);
         let down = scenario.network.failure.iter().map(|failure| LinkOutage {
             ends: failure.link.map(index),
@@ -104,7 +107,7 @@ impl<T> Radio<T> {
             used_for,
             down: down.collect(),
             silent_from_s,
-            lost_before: vec![None; links],
+            lost_before: vec![None; if hops > 1 { count * count } else { links }],
             sent: 0,
             lost: 0,
             rounds: 0,
@@ -162,10 +165,12 @@ impl<T> Radio<T> {
         let draws = DRAWS * most * relay.as_ref().map_or(1, |relay| relay.most as usize);
         let mut draw = is_random.then(|| self.noise.draw(sender, self.used_for as usize, self.rounds + 1, draws));
         for (link, receiver) in links {
-            // A message without a path is lost at its first hop.
-            let hops = relay.as_ref().map_or(1, |relay| relay.hops[receiver].max(1));
+            let (hops, is_reached) = match &relay {
+                Some(relay) => (relay.hops[receiver], relay.hops[receiver] > 0),
+                None => (1, self.is_linked((sender, receiver), sent_s, positions_m)),
+            };
             let (mut by_chance, mut jitters) = (false, 0.0);
-            for _ in 0..hops {
+            let mut pass = |link: usize| {
                 let [unit, jitter] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
                 by_chance |= self.loss.is_some_and(|loss| {
                     let is_lost = loss.next(self.lost_before[link], unit);
@@ -173,11 +178,15 @@ impl<T> Radio<T> {
                     is_lost
                 });
                 jitters += jitter;
-            }
-            let is_reached = match &relay {
-                Some(relay) => relay.hops[receiver] > 0,
-                None => self.is_linked((sender, receiver), sent_s, positions_m),
             };
+            match &relay {
+                Some(relay) => {
+                    for (from, to) in relay.path(receiver) {
+                        pass(from * relay.hops.len() + to);
+                    }
+                }
+                None => pass(link),
+            }
             let is_lost = by_chance || !is_reached;
             self.sent += 1;
             self.lost += u64::from(is_lost);
@@ -224,13 +233,25 @@ struct Relay {
     most: u32,
     /// Smallest number of hops from the present sender to each vehicle; 0 for the sender, and without a path.
     hops: Vec<u32>,
+    /// Vehicle from which each vehicle has the message, if a message reached it.
+    passed_by: Vec<usize>,
     /// Vehicles that a message reached, in the order of their hops.
     reached: Vec<usize>,
 }
 
 impl Relay {
     fn new(most: u32, count: usize) -> Self {
-        Self { most, hops: vec![0; count], reached: Vec::with_capacity(count) }
+        Self { most, hops: vec![0; count], passed_by: vec![0; count], reached: Vec::with_capacity(count) }
+    }
+
+    /// Hops of the message to a vehicle, the last one first; none if no message reached it.
+    fn path(&self, receiver: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let mut to = receiver;
+        (0..self.hops[receiver]).map(move |_| {
+            let hop = (self.passed_by[to], to);
+            to = hop.0;
+            hop
+        })
     }
 
     /// Counts the hops of a message from a sender, while the vehicles stay where they are.
@@ -247,6 +268,7 @@ impl Relay {
             for to in 0..self.hops.len() {
                 if to != sender && self.hops[to] == 0 && is_linked(from, to) {
                     self.hops[to] = self.hops[from] + 1;
+                    self.passed_by[to] = from;
                     self.reached.push(to);
                 }
             }
@@ -302,6 +324,8 @@ mod tests {
         let mut relay = Relay::new(3, 6);
         relay.count_hops(1, neighbours);
         assert_eq!(relay.hops, [1, 0, 1, 2, 3, 0]);
+        assert_eq!(relay.path(4).collect::<Vec<_>>(), [(3, 4), (2, 3), (1, 2)]);
+        assert_eq!((relay.path(1).count(), relay.path(5).count()), (0, 0));
         relay.count_hops(0, neighbours);
         assert_eq!(relay.hops, [0, 1, 2, 3, 0, 0]);
         // A vehicle that passes on nothing ends the path.

@@ -190,6 +190,17 @@ fn vehicles_pass_on_messages_up_to_the_largest_number_of_hops() {
     let expected = 1.0 - (6.0 * 0.8 + 4.0 * 0.8_f64.powi(2) + 2.0 * 0.8_f64.powi(3)) / 12.0;
     let lost = traffic.lost as f64 / traffic.sent as f64;
     assert!((lost - expected).abs() < 0.01, "{lost} {expected}");
+    // A link that is bad for long loses the messages of all paths over it at once.
+    scenario.network.loss_burst = Some(100.0);
+    let mut link = of(&scenario, true);
+    let [mut both, mut near] = [0_u32; 2];
+    after(link.as_mut(), 0..=4000, |_, sensed| {
+        let picture = picture(&sensed);
+        let is_late = |receiver: usize| picture.received(receiver, 0).age_s > 0.02 * receiver as f64 + 0.005;
+        both += u32::from(is_late(1) && is_late(2));
+        near += u32::from(is_late(1));
+    });
+    assert!(near > 200 && f64::from(both) > 0.7 * f64::from(near), "{both} of {near}");
 }
 
 #[test]
