@@ -5,6 +5,7 @@ other instances of the same distribution.
 """
 
 import dataclasses
+import functools
 import math
 import random
 from collections.abc import Callable
@@ -492,14 +493,14 @@ def missions(quick: bool, seeds: int) -> list[Mission]:
             why="The rate comes back under the shield. Without it, no law here avoids columns and arrives",
         )
     )
+    r3r_circle_mission = functools.partial(
+        Mission, source=r3r_circle_source, success="never unsafe, each within 0.5 m", seeds=len(R3R_RANGES_M)
+    )
     listed += [
-        Mission(
+        r3r_circle_mission(
             f"R3R circle, {n} agents",
-            r3r_circle_source,
-            "never unsafe, each within 0.5 m",
-            r3r_circle_changes,
-            r3r_circle(n),
-            len(R3R_RANGES_M),
+            changes=r3r_circle_changes,
+            scene=r3r_circle(n),
             published=nmpc.format(rate),
             why=nmpc_why,
             compared="safe",
@@ -507,24 +508,14 @@ def missions(quick: bool, seeds: int) -> list[Mission]:
         for n, rate in ((2, 5), (4, 5), (8, 4), (16, 0))
     ]
     listed += [
-        Mission(
-            f"R3R circle without a limit of the range, {n} agents",
-            r3r_circle_source,
-            "never unsafe, each within 0.5 m",
-            dubins + stay + "No radio",
-            r3r_circle(n, limited=False),
-            len(R3R_RANGES_M),
-        )
-        for n in (8, 16)
-    ]
-    listed += [
-        Mission(
-            f"R3R circle with relays, {n} agents",
-            r3r_circle_source,
-            "never unsafe, each within 0.5 m",
-            r3r_circle_changes + ". Vehicles pass on messages, up to 8 hops",
-            r3r_circle(n, relay_hops=8),
-            len(R3R_RANGES_M),
+        r3r_circle_mission(f"R3R circle {name}, {n} agents", changes=changes, scene=scene(n))
+        for name, changes, scene in (
+            ("without a limit of the range", dubins + stay + "No radio", functools.partial(r3r_circle, limited=False)),
+            (
+                "with relays",
+                r3r_circle_changes + ". Vehicles pass on messages, up to 8 hops",
+                functools.partial(r3r_circle, relay_hops=8),
+            ),
         )
         for n in (8, 16)
     ]
